@@ -1,5 +1,6 @@
 //! Contact detection: broad phase, filters, narrow phase.
 
+use crate::contact::coplanar::FacePlane;
 use crate::contact::internal_edges::{InternalEdges, Surroundings};
 use crate::contact::laws::ContactLaws;
 use crate::contact::motion::Moved;
@@ -12,6 +13,7 @@ use crate::object::part_state::PartState;
 use crate::settings::Settings;
 use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects};
+use std::sync::Arc;
 use tumble_collide::{Aabb, BroadPhase, Contact, Vec3};
 
 /// The object of a row of the part table, and the part of it.
@@ -55,6 +57,8 @@ pub(crate) struct ContactConstraint {
     pub surface_velocity: Vec3,
     /// Laws of the pair beside Coulomb's, if any.
     pub laws: Option<Box<ContactLaws>>,
+    /// The plane that takes the place of a part's shape, if it is one tile of many.
+    pub plane: Option<Arc<FacePlane>>,
     pub key: ContactKey,
 }
 
@@ -176,11 +180,14 @@ impl Detector<'_> {
         }
         self.scratch.found = found;
         self.scratch.pairs = pairs;
+        let (bounds, near) = (&self.scratch.part_bounds, 2.0 * self.settings.drift_tolerance);
+        let motion = |part: u32| bounds[part as usize].as_ref().map_or(MotionBounds::default(), |bounds| bounds.motion);
         let around = Surroundings {
             objects: self.objects,
             owners: self.owners,
             part_states: self.part_states,
             drift_tolerance: self.settings.drift_tolerance,
+            margin: &|a, b| near + motion(a).between(&motion(b), prediction),
         };
         self.scratch.internal_edges.remove(&around, out);
     }
@@ -382,6 +389,7 @@ impl NarrowPhase<'_> {
             restitution: material.restitution,
             surface_velocity,
             laws: laws.clone(),
+            plane: None,
             key: ContactKey { pair, feature: contact.feature },
         }));
         if time > 0.0 {

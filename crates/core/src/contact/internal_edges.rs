@@ -1,5 +1,5 @@
-//! Contacts at edges inside a surface that several bodies form together: flush boxes of a floor. The
-//! bodies that form it do not move; in heaps of moving ones all contacts stay.
+//! Contacts at edges inside a surface that several bodies form together, where it is not one plane below the
+//! whole body (`coplanar.rs`). The bodies that form it do not move; in heaps of moving ones all contacts stay.
 //!
 //! The narrow phase knows one pair at a time. For a body `A` on a box `B₁`, the edge of the next
 //! box `B₂` is a corner that sticks out; in the surface of both together it does not exist. A
@@ -22,15 +22,16 @@
 //! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
 //! `flush`.
 
+use crate::contact::coplanar::PlaneContacts;
 use crate::contact::detect::{ContactConstraint, Owner};
 use crate::object::part_state::PartState;
 use crate::world::view::Objects;
 use tumble_collide::{Shape, SurfacePoint, Vec3, closest_point_within};
 
 /// Height above the plane at which `B₂` must be absent, in drift tolerances.
-const LIFT: f64 = 10.0;
+pub(crate) const LIFT: f64 = 10.0;
 /// Difference of height of flush surfaces, as a fraction of the lift: a ramp of 4° rises so much.
-const FLUSH: f64 = 2e-3;
+pub(crate) const FLUSH: f64 = 2e-3;
 /// Distance by which the points of a contact may lie beside the surface, in bounding radii.
 const MAX_OVERHANG: f64 = 2e-3;
 /// Difference of equal normals.
@@ -54,19 +55,21 @@ pub(crate) struct InternalEdges {
     order: Vec<Entry>,
     /// The row of the part whose surface has removed each contact.
     removed_by: Vec<Option<u32>>,
+    /// Contacts with planes, which replace others.
+    of_planes: Vec<ContactConstraint>,
 }
 
 /// A contact as one of its parts, `A`, sees it.
 #[derive(Clone, Copy)]
-struct Entry {
-    contact: u32,
+pub(crate) struct Entry {
+    pub contact: u32,
     /// The row of the other part.
-    other: u32,
-    gap: f64,
+    pub other: u32,
+    pub gap: f64,
     /// Unit normal, towards `A`.
-    normal: Vec3,
+    pub normal: Vec3,
     /// Point on the other part, m.
-    point: Vec3,
+    pub point: Vec3,
 }
 
 impl Entry {
@@ -86,10 +89,12 @@ pub(crate) struct Surroundings<'a> {
     pub part_states: &'a [PartState],
     /// m.
     pub drift_tolerance: f64,
+    /// Returns the margin of contacts of two parts, m.
+    pub margin: &'a dyn Fn(u32, u32) -> f64,
 }
 
 impl Surroundings<'_> {
-    fn shape(&self, part: u32) -> Option<&Shape> {
+    pub fn shape(&self, part: u32) -> Option<&Shape> {
         let owner = &self.owners[part as usize];
         self.objects.at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
     }
@@ -102,7 +107,7 @@ impl Surroundings<'_> {
 
     /// Returns the point of a part's surface that is closest to a point; `None` if it is more than
     /// `limit` away, m.
-    fn closest(&self, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+    pub fn closest(&self, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
         let shape = self.shape(part)?;
         let pose = &self.part_states[part as usize].pose;
         let reach = shape.bounding_radius() + limit;
@@ -159,11 +164,21 @@ impl InternalEdges {
                     .chunk_by(|x, y| x.other == y.other)
                     .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
             );
+            self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
+            if let Some(plane) = PlaneContacts::find(around, (entries, &self.nearest), contacts) {
+                let replaced = entries.iter().filter(|e| plane.tiles.contains(&e.other));
+                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.other));
+                self.of_planes.extend(plane.contacts);
+                any = true;
+            }
             // nearer ones first, so it is known by whom they are removed
             self.order.clear();
             self.order.extend_from_slice(entries);
             self.order.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
-            for c in &self.order {
+            for c in self.order.iter() {
+                if self.removed_by[c.contact as usize].is_some() {
+                    continue;
+                }
                 let internal = |first: &&Entry| {
                     let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
                     let mutual = level && self.removed_by[first.contact as usize] == Some(c.other);
@@ -178,6 +193,10 @@ impl InternalEdges {
         if any {
             let mut removed = self.removed_by.iter();
             contacts.retain(|_| removed.next().is_none_or(Option::is_none));
+            if !self.of_planes.is_empty() {
+                contacts.append(&mut self.of_planes);
+                contacts.sort_by_key(|contact| contact.key);
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! Contact detection: broad phase, filters and narrow phase for pairs of parts, and the constants
 //! of the pairs.
 
+mod coplanar;
 pub(crate) mod detect;
 mod internal_edges;
 pub(crate) mod laws;

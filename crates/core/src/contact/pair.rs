@@ -73,7 +73,7 @@ impl MotionBounds {
     }
 
     /// Returns the distance by which a gap between two parts may close, m.
-    fn between(&self, other: &MotionBounds, prediction: PredictionMode) -> f64 {
+    pub fn between(&self, other: &MotionBounds, prediction: PredictionMode) -> f64 {
         let turns = self.turn + other.turn;
         match prediction {
             PredictionMode::Relative => turns + (self.way - other.way).norm() + (self.gain - other.gain).norm(),

@@ -22,6 +22,7 @@
 //! The gap between convex shapes along the present normal closes no later than the shapes meet, so
 //! no advance overshoots. Another part of a mesh may come first, so meshes advance by the bound.
 
+use super::coplanar::{FacePlane, HALF_SPACE};
 use super::detect::{ContactConstraint, Owner};
 use super::own_tests::OwnTests;
 use crate::object::collidable::Collidable;
@@ -31,6 +32,7 @@ use crate::settings::Settings;
 use crate::threads::Threads;
 use crate::world::view::Objects;
 use nalgebra::Translation3;
+use std::sync::Arc;
 use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
 
 /// A relative displacement in the step below this fraction of the smaller bounding radius needs no
@@ -218,12 +220,14 @@ fn is_at_edge(contact: &Contact) -> bool {
     matches!(contact.normal_from, NormalFrom::LineOfA(_) | NormalFrom::LineOfB(_))
 }
 
-/// Returns the parts of a contact; `None` if one has no shape.
+/// Returns two parts, one of them as the `plane` that it forms with others if there is one; `None` if one has
+/// no shape.
 pub(crate) fn moving_pair<'a>(
     objects: Objects<'a>,
     owners: &[Owner],
     part_states: &'a [PartState],
-    contact: &ContactConstraint,
+    [a, b]: [u32; 2],
+    plane: Option<&'a FacePlane>,
 ) -> Option<MovingPair<'a>> {
     let part = |index: u32| {
         let owner = owners[index as usize];
@@ -231,15 +235,37 @@ pub(crate) fn moving_pair<'a>(
         let body: &dyn Collidable = object.collidable()?;
         Some((body.shape(part)?, body.contact_mode(part), (object, part)))
     };
-    let ((a, mode_a, side_a), (b, mode_b, side_b)) = part(contact.a).zip(part(contact.b))?;
-    let part_states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
+    let ((shape_a, mode_a, side_a), (shape_b, mode_b, side_b)) = part(a).zip(part(b))?;
+    let mut part_states = [a, b].map(|index| &part_states[index as usize]);
+    let mut shapes = [shape_a, shape_b];
+    if let Some(plane) = plane {
+        let side = usize::from(!plane.is_a);
+        (shapes[side], part_states[side]) = (&HALF_SPACE, &plane.state);
+    }
     Some(MovingPair {
         mode: mode_a.of_pair(mode_b),
-        shapes: [a, b],
+        shapes,
         tests: OwnTests::of([side_a, side_b]),
         part_states,
         skipped: &[],
     })
+}
+
+/// Returns the pair of a contact, and the number of samples of its motion in `h` seconds, if it is fast.
+fn fast_pair<'a>(
+    objects: Objects<'a>,
+    (owners, part_states): (&[Owner], &'a [PartState]),
+    h: f64,
+    contact: &'a ContactConstraint,
+) -> Option<(MovingPair<'a>, f64)> {
+    let sides = [contact.a, contact.b];
+    let states = sides.map(|index| &part_states[index as usize]);
+    let motion = h * (states[0].velocity - states[1].velocity).norm();
+    let pair = moving_pair(objects, owners, part_states, sides, contact.plane.as_deref())?;
+    let short = SHORT_MOTION * pair.size();
+    // contacts of a mesh begin and end with its features; a surface of an own test need not be convex
+    let timed = motion >= short && pair.is_convex() && !pair.tests.any();
+    timed.then_some((pair, (motion / short).min(MAX_SAMPLES).ceil()))
 }
 
 /// Replaces the contacts of fast convex parts that close within `h` by those at the time at which
@@ -253,18 +279,9 @@ pub(crate) fn time_contacts(
     contact_constraints: &mut Vec<ContactConstraint>,
     predicted: &mut Vec<ContactConstraint>,
 ) {
-    // the pair of a contact, and the number of samples of its motion, if it is fast
-    let timed = |contact: &ContactConstraint| {
-        let states = [contact.a, contact.b].map(|index| &part_states[index as usize]);
-        let motion = h * (states[0].velocity - states[1].velocity).norm();
-        let pair = moving_pair(objects, owners, part_states, contact)?;
-        let short = SHORT_MOTION * pair.size();
-        // contacts of a mesh begin and end with its features; a surface of an own test need not be convex
-        let timed = motion >= short && pair.is_convex() && !pair.tests.any();
-        timed.then_some((pair, (motion / short).min(MAX_SAMPLES).ceil()))
-    };
-    let same_pair = |x: &ContactConstraint, y: &ContactConstraint| x.key.pair == y.key.pair;
-    let slow = contact_constraints.chunk_by(same_pair).take_while(|contacts| timed(&contacts[0]).is_none());
+    let parts = (owners, part_states);
+    let is_slow = |contact: &ContactConstraint| fast_pair(objects, parts, h, contact).is_none();
+    let slow = contact_constraints.chunk_by(same_surfaces).take_while(|contacts| is_slow(&contacts[0]));
     let slow: usize = slow.map(<[ContactConstraint]>::len).sum();
     predicted.clear();
     if slow == contact_constraints.len() {
@@ -278,8 +295,8 @@ pub(crate) fn time_contacts(
     std::mem::swap(contact_constraints, &mut pieces[0].1);
     threads.each(pieces.iter_mut(), |(piece, out)| {
         let mut found = Vec::new();
-        for contacts in piece.chunk_by(same_pair) {
-            match timed(&contacts[0]) {
+        for contacts in piece.chunk_by(same_surfaces) {
+            match fast_pair(objects, parts, h, &contacts[0]) {
                 Some((pair, samples)) => {
                     pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), &mut found, out);
                 }
@@ -291,12 +308,18 @@ pub(crate) fn time_contacts(
     pieces.into_iter().for_each(|(_, mut timed)| contact_constraints.append(&mut timed));
 }
 
+/// Returns whether two contacts are of the same parts, or of a part and the same plane.
+fn same_surfaces(x: &ContactConstraint, y: &ContactConstraint) -> bool {
+    let same_plane = || x.plane.as_ref().zip(y.plane.as_ref()).is_some_and(|(x, y)| Arc::ptr_eq(x, y));
+    x.key.pair == y.key.pair || same_plane()
+}
+
 /// Returns pieces of the contacts; no pair is divided.
 fn pieces_of_pairs<'a>(threads: &Threads, contacts: &'a [ContactConstraint]) -> Vec<&'a [ContactConstraint]> {
     let (mut pieces, mut start) = (Vec::new(), 0);
     for piece in threads.pieces(contacts.len(), CONTACTS) {
         let mut end = piece.end.max(start);
-        while end > 0 && end < contacts.len() && contacts[end].key.pair == contacts[end - 1].key.pair {
+        while end > 0 && end < contacts.len() && same_surfaces(&contacts[end], &contacts[end - 1]) {
             end += 1;
         }
         pieces.push(&contacts[start..end]);
@@ -324,7 +347,7 @@ impl MovingPair<'_> {
         let skipped: Vec<u64> = touching.iter().map(|c| c.key.feature).collect();
         MovingPair { skipped: &skipped, ..*self }.follow_open(&open, limits, found, out);
         out.extend(touching.into_iter().cloned());
-        out[begin..].sort_by_key(|constraint| constraint.key.feature);
+        out[begin..].sort_by_key(|constraint| constraint.key);
     }
 
     /// Appends the contacts of the pair, for those that are predicted and followed.

@@ -35,7 +35,26 @@ enum Floor {
     /// Rows of flush boxes: along x, and along y, meters.
     Boxes {
         size: [f64; 2],
+        kind: Tile,
     },
+}
+
+/// How a flush box is made.
+#[derive(Clone, Copy, Debug)]
+enum Tile {
+    Box,
+    Hull,
+    Mesh,
+}
+
+impl Tile {
+    fn shape(self, size: Vec3) -> Shape {
+        match self {
+            Tile::Box => Shape::cuboid(size).unwrap(),
+            Tile::Hull => Shape::convex_hull(&TriMesh::cuboid(size).vertices).unwrap(),
+            Tile::Mesh => Shape::mesh(TriMesh::cuboid(size), &TreeSettings::octree()).unwrap(),
+        }
+    }
 }
 
 /// A body on the floor, moving along x.
@@ -81,7 +100,7 @@ struct Case {
     heading: f64,
 }
 
-/// A closed slab of 0.2 m whose top is a grid of coplanar cells.
+/// A closed slab of 0.2 m whose top is a grid of coplanar cells. Up to a jitter of 0.6 no triangle is turned over.
 fn slab(cells: usize, jitter: f64) -> TriMesh {
     let mut seed = 1u64;
     let mut random = || {
@@ -165,14 +184,14 @@ impl Floor {
                 let turn = Quat::from_euler_angles(0.0, 0.0, yaw);
                 add_body("floor", shape.clone().unwrap(), Pose::from_parts(middle.into(), turn));
             }
-            Floor::Boxes { size: [length, width] } => {
+            Floor::Boxes { size: [length, width], kind } => {
+                let tile = kind.shape(Vec3::new(length, width, 0.2));
                 let counts = [length, width].map(|size| (FLOOR / size).ceil() as usize);
                 for i in 0..counts[0] {
                     for j in 0..counts[1] {
                         let x = FLOOR_START + (i as f64 + 0.5) * length;
                         let y = (j as f64 + 0.5) * width - 0.5 * FLOOR;
-                        let shape = Shape::cuboid(Vec3::new(length, width, 0.2)).unwrap();
-                        add_body(&format!("box {i} {j}"), shape, Pose::translation(x, y, -0.1));
+                        add_body(&format!("box {i} {j}"), tile.clone(), Pose::translation(x, y, -0.1));
                     }
                 }
             }
@@ -288,7 +307,7 @@ fn a_flat_mesh_acts_like_a_half_space() {
     let floors = [
         Floor::Slab { cells: 100, yaw: 0.0, jitter: 0.0 },
         Floor::Slab { cells: 100, yaw: 0.3, jitter: 0.6 },
-        Floor::Slab { cells: 37, yaw: 1.0, jitter: 0.9 },
+        Floor::Slab { cells: 37, yaw: 1.0, jitter: 0.6 },
     ];
     acts_like_a_half_space(if slow() { &floors } else { &floors[..2] }, 1e-6, |_, _| true);
 }
@@ -303,20 +322,16 @@ fn a_flat_height_field_and_a_flat_terrain_act_like_a_half_space() {
     acts_like_a_half_space(if slow() { &floors } else { &floors[1..] }, 1e-6, |_, _| true);
 }
 
-const ROWS: [Floor; 2] = [Floor::Boxes { size: [0.25, 4.0] }, Floor::Boxes { size: [0.25, 0.25] }];
+const ROWS: [Floor; 4] = [
+    Floor::Boxes { size: [0.25, 4.0], kind: Tile::Box },
+    Floor::Boxes { size: [0.25, 0.25], kind: Tile::Box },
+    Floor::Boxes { size: [0.25, 0.25], kind: Tile::Hull },
+    Floor::Boxes { size: [0.25, 0.25], kind: Tile::Mesh },
+];
 
-/// Without the sphere of facets, see [`cylinders_cross_the_seams_of_boxes`] for cylinders.
 #[test]
 fn flush_boxes_act_like_a_half_space() {
-    let tested = |mover| !matches!(mover, Mover::Cylinder | Mover::Puck | Mover::MeshSphere);
-    acts_like_a_half_space(&ROWS, 1e-6, |mover, _| tested(mover));
-}
-
-/// The rims and sides of a cylinder touch the seams themselves, with contacts that differ from those
-/// of a plane.
-#[test]
-fn cylinders_cross_the_seams_of_boxes() {
-    acts_like_a_half_space(&ROWS, 1e-2, |mover, _| matches!(mover, Mover::Cylinder | Mover::Puck));
+    acts_like_a_half_space(if slow() { &ROWS } else { &ROWS[..2] }, 1e-6, |_, _| true);
 }
 
 /// A wall on the floor is no internal edge: a body that slides to it stops there.
@@ -325,7 +340,7 @@ fn a_wall_on_a_floor_is_struck() {
     for stepper in STEPPERS {
         for (mover, height) in [(Mover::Box, 1.0), (Mover::Puck, 0.3), (Mover::MeshBox, 0.2)] {
             let mut world = world(stepper, 1.0 / 240.0);
-            let floor = Floor::Boxes { size: [0.25, 4.0] };
+            let floor = Floor::Boxes { size: [0.25, 4.0], kind: Tile::Box };
             floor.add_to(&mut world, &None, 0.0);
             let material = Material { friction: 0.0, restitution: 0.0, ..Material::default() };
             let wall = Shape::cuboid(Vec3::new(0.25, 4.0, height)).unwrap();

@@ -81,6 +81,7 @@ mod stacks;
 mod state;
 mod still;
 mod threads;
+mod tiles;
 mod turning;
 mod unreachable_joints;
 mod velocity_limits;

@@ -96,7 +96,8 @@ pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, (fraction, rate
         if s < 0.0 {
             continue;
         }
-        let pair = moving_pair(core.objects(), &core.owners, part_states, constraint);
+        let (sides, plane) = ([constraint.a, constraint.b], constraint.plane.clone());
+        let pair = moving_pair(core.objects(), &core.owners, part_states, sides, plane.as_deref());
         if let Some(pair) = pair.filter(|pair| !pair.shapes.iter().any(|shape| shape.has_tree())) {
             let reach = pair.reach(&constraint.contact.point, s * h);
             let margin = constraint.contact.gap.abs() + reach + core.settings.drift_tolerance;
