@@ -17,13 +17,23 @@
 //! velocities. An island without a contact or limit is left to the following rounds.
 //!
 //! Errors from before the step are reduced by a bounded amount. Friction takes no part.
+//!
+//! **Contacts that contradict each other.** A nut that jams between the flanks of a thread, or a body in a gap
+//! that is too narrow, can only get out to first order: along the line where two nearly opposite planes
+//! meet, which can be any distance away, and where the surfaces end long before. So bodies of an island move
+//! against each other by at most [`REACH`] times its largest violation. Where the rows ask for more, they yield,
+//! `gap + h·n·(v̄ + Δ) + h·R·λ ≥ 0` with `R = ε·n·M⁻¹·n`, and share the overlap:
+//!
+//! ```text
+//! |Δ|² = Σ kᵢ·bᵢ²/(kᵢ + ε)² ≤ |b|²/(4·ε)        kᵢ: eigenvalues of the rows' response over its diagonal, b: violations
+//! ```
 
 use super::super::Moment;
 use super::super::budget::shared;
 use super::super::contacts::{Limit, Workspace, displace};
 use super::super::islands::each_island;
 use super::{Contacts, Options, is_joint};
-use crate::constraint::rows::{RowSet, Rows};
+use crate::constraint::rows::{Block, RowSet, Rows};
 use crate::linearize::Switch;
 use crate::object::RowTarget;
 use crate::solver::SolverSettings;
@@ -31,6 +41,11 @@ use crate::world::Core;
 
 /// Share of the work that is left in a correction before a sub-step of `backtracking`.
 const IN_PLACE: f64 = 0.25;
+
+/// Largest displacement of two bodies against each other at a contact, in violations of their island.
+const REACH: f64 = 20.0;
+/// `ε`.
+const YIELDING: f64 = 1e-2;
 
 /// Moves the objects of islands with a violation above the tolerance. `gaps` are those of the
 /// limits at the present numbers. Returns whether anything moved.
@@ -72,7 +87,7 @@ pub(super) fn separate(
     work.islands.build(&work.rows, |b| b < contacts || rigid(&targets[b - contacts]));
     let waits = |t: &RowTarget| is_joint(t) && t.velocity == 0.0;
     let later = |&b: &u32| !in_place && (b as usize) >= contacts && waits(&targets[b as usize - contacts]);
-    let mut moved = false;
+    let mut solved = Vec::new();
     let Frictionless { rows, c, lambda, du } = &mut p;
     let left_alone = |blocks: &[u32]| {
         let within = || blocks.iter().all(|&b| violation(b as usize, &work.c) <= least);
@@ -80,7 +95,7 @@ pub(super) fn separate(
     };
     let budget = core.meter.left(if in_place { IN_PLACE } else { 1.0 });
     let all = budget.map_or(0, |_| work.islands.iter().filter(|blocks| !left_alone(blocks)).map(<[u32]>::len).sum());
-    let solve = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
+    let solve = |rows: &Rows, blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| {
         if left_alone(blocks) {
             return false;
         }
@@ -98,7 +113,30 @@ pub(super) fn separate(
         core.meter.count(core.solver.solve(rows, blocks, c, lambda, du, solver_settings).relaxations);
         true
     };
-    each_island(&core.threads, rows, work.islands.iter(), (lambda, du), solve, |solved| moved |= solved);
+    let first = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| solve(rows, blocks, lambda, du);
+    each_island(&core.threads, rows, work.islands.iter(), (lambda, du), first, |moved| solved.push(moved));
+    let is_far = |blocks: &[u32]| {
+        let worst = blocks.iter().map(|&b| violation(b as usize, &work.c)).fold(0.0, f64::max);
+        let of_contacts = blocks.iter().filter(|&&b| (b as usize) < contacts);
+        let way =
+            of_contacts.map(|&b| h * relative_speed(&work.rows, &work.rows.blocks[b as usize], du)).fold(0.0, f64::max);
+        core.branches.take(Switch::Overlap, None, way > REACH * worst)
+    };
+    let moved = solved.contains(&true);
+    let islands = work.islands.iter().zip(solved);
+    let far: Vec<&[u32]> =
+        islands.filter(|(blocks, solved)| *solved && is_far(blocks)).map(|(blocks, _)| blocks).collect();
+    if !far.is_empty() {
+        far.iter().copied().flatten().for_each(|&b| {
+            let response = response(rows, &rows.blocks[b as usize]);
+            let block = &mut rows.blocks[b as usize];
+            block.compliance += if block.set == RowSet::HalfLine { YIELDING * response } else { 0.0 };
+            lambda[block.range()].fill(0.0);
+            block.sides().iter().for_each(|side| du[side.u as usize..(side.u + side.dof) as usize].fill(0.0));
+        });
+        let again = |blocks: &[u32], lambda: &mut [f64], du: &mut [f64]| solve(rows, blocks, lambda, du);
+        each_island(&core.threads, rows, far.iter().copied(), (lambda, du), again, |_| ());
+    }
     displace(core.coordinates(acting), &p.du, h);
     work.frictionless = p;
     moved
@@ -120,6 +158,23 @@ fn predict(work: &mut Workspace, gaps: &[Limit], contacts: Contacts, h: f64) {
             let row = work.rows.blocks[first + target].row as usize;
             work.c[row] = (end.gap - work.targets[target].error) / h;
         }
+    }
+}
+
+/// Returns `n·M⁻¹·n` of a block's first row.
+fn response(rows: &Rows, block: &Block) -> f64 {
+    block.sides().iter().flat_map(|side| rows.response(side, 0)).map(|y| y * y).sum()
+}
+
+/// Returns the speed of the bodies of a contact against each other, m/s. Without friction the rows do not say how
+/// they slide: then it is the speed of the mass that the contact feels, of a body against a fixed one.
+fn relative_speed(rows: &Rows, block: &Block, du: &[f64]) -> f64 {
+    match block.sides() {
+        [side] if block.range().len() == 1 => {
+            let squares = du[side.u as usize..(side.u + side.dof) as usize].iter().map(|u| u * u);
+            (response(rows, block) * squares.sum::<f64>()).sqrt()
+        }
+        _ => (0..block.range().len()).map(|k| rows.row_velocity(block, k, du).powi(2)).sum::<f64>().sqrt(),
     }
 }
 
