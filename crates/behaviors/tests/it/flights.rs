@@ -92,7 +92,7 @@ fn in_a_box(threads: u32, minutes: f64) -> Vec<u8> {
 
 /// A minute, and ten with `TUMBLE_SLOW=1`.
 #[test]
-fn boids_in_a_box_of_walls_stay_in_it_with_the_same_bytes_on_any_number_of_threads() {
+fn boids_in_a_box_of_walls_stay_in_it_with_the_same_bytes_on_any_number_of_threads_full_length() {
     let minutes = if std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1") { 10.0 } else { 1.0 };
     let first = in_a_box(1, minutes);
     for threads in [1, 2, 3] {

@@ -64,7 +64,7 @@ fn a_heap_under_a_tight_budget_is_less_accurate_and_stands() {
 /// The table of `docs/steppers.md` (two of its rows without `TUMBLE_SLOW`): no budget makes a frame gain more energy than that of lifting the heap
 /// by its overlap.
 #[test]
-fn the_table_of_budgets() {
+fn the_table_of_budgets_full_length() {
     let all = [Some(200_000), Some(BUDGET), None, Some(100_000), Some(50_000), Some(10_000)];
     let count = if std::env::var_os("TUMBLE_SLOW").is_some() { 6 } else { 2 };
     for budget in all.into_iter().take(count) {

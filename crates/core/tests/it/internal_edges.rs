@@ -303,7 +303,7 @@ fn acts_like_a_half_space(floors: &[Floor], bound: f64, is_tested: impl Fn(Mover
 }
 
 #[test]
-fn a_flat_mesh_acts_like_a_half_space() {
+fn a_flat_mesh_acts_like_a_half_space_full_length() {
     let floors = [
         Floor::Slab { cells: 100, yaw: 0.0, jitter: 0.0 },
         Floor::Slab { cells: 100, yaw: 0.3, jitter: 0.6 },
@@ -313,7 +313,7 @@ fn a_flat_mesh_acts_like_a_half_space() {
 }
 
 #[test]
-fn a_flat_height_field_and_a_flat_terrain_act_like_a_half_space() {
+fn a_flat_height_field_and_a_flat_terrain_act_like_a_half_space_full_length() {
     let floors = [
         Floor::HeightField { count: 64, yaw: 0.0 },
         Floor::HeightField { count: 101, yaw: 0.4 },
@@ -330,7 +330,7 @@ const ROWS: [Floor; 4] = [
 ];
 
 #[test]
-fn flush_boxes_act_like_a_half_space() {
+fn flush_boxes_act_like_a_half_space_full_length() {
     acts_like_a_half_space(if slow() { &ROWS } else { &ROWS[..2] }, 1e-6, |_, _| true);
 }
 

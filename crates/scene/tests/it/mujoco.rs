@@ -55,7 +55,7 @@ fn models_of_the_tests_are_as_mujoco_reads_them() {
 }
 
 #[test]
-fn models_of_installed_packages_are_as_mujoco_reads_them() {
+fn models_of_installed_packages_are_as_mujoco_reads_them_full_length() {
     let Some(Ok(listed)) = python(&["models"]) else { return };
     let (mut count, mut failed) = (0, Vec::new());
     // All of them take two minutes.

@@ -211,7 +211,7 @@ fn chain_stays_joined_loses_energy_and_balances_its_impulses_about_the_hook() {
 /// `x = r·cos ψ + √(l² − r²·sin² ψ)` of each piston, `ψ` the crank's angle from its cylinder, for a
 /// minute with `TUMBLE_SLOW=1`.
 #[test]
-fn piston_follows_the_slider_crank_formula_without_drift() {
+fn piston_follows_the_slider_crank_formula_without_drift_full_length() {
     let slow = std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1");
     for (stepper, seconds) in [
         (tumble::scene::Stepper::TimeStepping, if slow { 60.0 } else { 5.0 }),
