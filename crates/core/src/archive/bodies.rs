@@ -20,6 +20,7 @@ pub(super) struct RigidRecord {
     /// Mass, kg, and inertia, kg·m²; `None` for a fixed body.
     mass: Option<(f64, Mat3)>,
     material: Material,
+    shape_materials: Vec<(usize, Material)>,
     linear_damping: f64,
     angular_damping: f64,
     gravity_scale: f64,
@@ -44,6 +45,7 @@ impl RigidRecord {
             shape: tables.shapes.index(body.shape()),
             mass: (!body.is_fixed()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
+            shape_materials: body.shape_materials().to_vec(),
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
             gravity_scale: body.gravity_scale,
@@ -68,6 +70,9 @@ impl RigidRecord {
             None => RigidBody::fixed(shape),
         };
         let mut body = body.with_center_in_part(self.center);
+        for (shape, material) in self.shape_materials {
+            body.set_shape_material(shape, Some(material));
+        }
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.gravity_scale, body.locked) = (self.gravity_scale, self.locked);

@@ -73,5 +73,6 @@ fn exchanged(contact: &Contact) -> Contact {
         both => both,
     };
     let (core_a, core_b) = (contact.core_b, contact.core_a);
-    Contact { normal: -contact.normal, core_a, core_b, normal_from, ..*contact }
+    let shapes = [contact.shapes[1], contact.shapes[0]];
+    Contact { normal: -contact.normal, core_a, core_b, normal_from, shapes, ..*contact }
 }

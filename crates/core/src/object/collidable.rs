@@ -56,6 +56,12 @@ pub trait Collidable {
         let _ = part;
         Material::default()
     }
+    /// Returns the surface constants of single shapes of a part, for those that have their own: the
+    /// index of a compound's part with its constants, ascending. None by default.
+    fn shape_materials(&self, part: usize) -> &[(usize, Material)] {
+        let _ = part;
+        &[]
+    }
     /// Returns the collision group of a part.
     fn collision_group(&self, part: usize) -> CollisionGroup {
         let _ = part;

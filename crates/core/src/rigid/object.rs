@@ -428,6 +428,10 @@ impl Collidable for RigidBody {
         self.material
     }
 
+    fn shape_materials(&self, _part: usize) -> &[(usize, Material)] {
+        &self.shape_materials
+    }
+
     fn collision_group(&self, _part: usize) -> CollisionGroup {
         self.group
     }

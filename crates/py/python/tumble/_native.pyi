@@ -407,6 +407,22 @@ class RigidBody:
         """Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts."""
     @adhesion.setter
     def adhesion(self, value: float) -> None: ...
+    def shape_material(self, shape: int) -> dict[str, Any]: ...
+    def set_shape_material(
+        self,
+        shape: int,
+        *,
+        friction: float | None = None,
+        restitution: float | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
+    ) -> None: ...
     @property
     def color(self) -> _Floats:
         """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""

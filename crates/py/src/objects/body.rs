@@ -30,12 +30,12 @@ pub struct RigidBody {
 handle!(RigidBody, "RigidBody", |_| Some(String::new()));
 
 impl RigidBody {
-    fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
+    pub(super) fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
     }
 
     /// Changes a constant. An invalid value changes nothing.
-    fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
+    pub(super) fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.change_body(self.place.id, set)?))
     }
 

@@ -15,6 +15,7 @@ pub mod mimic;
 pub mod place;
 pub mod robot;
 pub mod sensor;
+pub mod shape_material;
 pub mod shapes;
 pub mod spheretree;
 pub mod terrain;

@@ -13,7 +13,7 @@ use crate::parse::link::read_inertia;
 use crate::parse::material::{MaterialSpec, read_contact, read_sound};
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
-use crate::parse::shape::ShapeSpec;
+use crate::parse::shape::{PartSurface, ShapeContext, ShapeSpec};
 use crate::parse::world::CONTACTS;
 
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
@@ -104,11 +104,13 @@ impl BodySpec {
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
         let name = read_name(f);
         let mode = read_mode(f);
-        let shape = ShapeSpec::read(f, &library.meshes);
-        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let material = read_material(f, library);
         let base = material.map(|index| &library.materials[index]);
-        let of_material = base.map_or_else(Material::default, |m| m.contact);
+        let contact = read_contact(f, &base.map_or_else(Material::default, |m| m.contact));
+        let surface = PartSurface { material, contact };
+        let context = ShapeContext { meshes: &library.meshes, surface: Some((library, surface)) };
+        let shape = ShapeSpec::read(f, context);
+        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -121,7 +123,7 @@ impl BodySpec {
             velocity_m_per_s: linear,
             angular_velocity_rad_per_s: angular,
             material,
-            contact: read_contact(f, &of_material),
+            contact,
             contacts: f.choice_or("contacts", CONTACTS, library.contacts),
             center_m: f.optional_vector("center_m", Bound::ANY),
             inertia_kg_m2: read_inertia(f),
