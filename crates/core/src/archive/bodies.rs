@@ -31,6 +31,7 @@ pub(super) struct RigidRecord {
     group: CollisionGroup,
     mask: u64,
     sensor: bool,
+    one_way: Option<Vec3>,
     initial_pose: Pose,
     initial_velocity: [Vec3; 2],
     visuals: Vec<VisualRecord>,
@@ -55,6 +56,7 @@ impl RigidRecord {
             group: body.group,
             mask: body.mask,
             sensor: body.sensor,
+            one_way: body.one_way,
             initial_pose: body.initial_pose,
             initial_velocity: [body.initial_velocity, body.initial_angular_velocity],
             visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
@@ -77,6 +79,7 @@ impl RigidRecord {
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.gravity_scale, body.locked) = (self.gravity_scale, self.locked);
         (body.group, body.mask, body.sensor) = (self.group, self.mask, self.sensor);
+        body.one_way = self.one_way;
         let [velocity, angular_velocity] = self.initial_velocity;
         let visuals = self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?;
         let body = body

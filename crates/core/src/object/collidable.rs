@@ -51,6 +51,12 @@ pub trait Collidable {
     fn intersect(&self) -> Option<&dyn Intersect> {
         None
     }
+    /// Returns the direction, unit, in the frame of the part, of a part that collides on one side only: with what
+    /// comes against this direction, as an open terrain and a one-way platform. None by default.
+    fn one_way(&self, part: usize) -> Option<Vec3> {
+        let _ = part;
+        None
+    }
     /// Returns the surface constants of a part.
     fn material(&self, part: usize) -> Material {
         let _ = part;

@@ -42,6 +42,9 @@ pub struct RigidBody {
     pub mask: u64,
     /// Whether it is a sensor: it has no contacts, and the world reports the bodies that overlap it.
     pub sensor: bool,
+    /// Direction, of any length above 0, in the body's frame, of a body that collides on one side only; `None` for all
+    /// others. See [`with_one_way`](Self::with_one_way).
+    pub one_way: Option<Vec3>,
     /// Pose of its frame at time 0.
     pub initial_pose: Pose,
     /// Velocity of the center of mass at time 0, m/s.
@@ -110,6 +113,7 @@ impl RigidBody {
             group: CollisionGroup::default(),
             mask: u64::MAX,
             sensor: false,
+            one_way: None,
             initial_pose: Pose::identity(),
             initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(),
@@ -315,6 +319,17 @@ impl RigidBody {
         self
     }
 
+    /// Makes it collide on one side only, as an open terrain and a platform that is entered from below: with what
+    /// comes against `direction` (any length above 0, the body's frame), and not with what comes along it.
+    ///
+    /// A contact exists if the outward normal of the body has a component along the direction, and the other body is
+    /// not in it by more than a tenth of its bounding radius: what came from the other side, or has fallen deeper, passes.
+    #[must_use]
+    pub fn with_one_way(mut self, direction: Vec3) -> Self {
+        self.one_way = Some(direction);
+        self
+    }
+
     /// Sets its visuals; by default its shape in gray.
     #[must_use]
     pub fn with_visuals(mut self, visuals: Vec<Visual>) -> Self {
@@ -406,6 +421,8 @@ impl RigidBody {
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
         range("gravity scale", self.gravity_scale, true, "finite")?;
+        let length = self.one_way.map_or(1.0, |direction| direction.norm());
+        range("length of the one-way direction", length, length > 0.0, "above 0")?;
         self.offset.iter().try_for_each(|&x| range("center of mass", x, true, "finite"))?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];

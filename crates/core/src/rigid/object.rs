@@ -451,6 +451,10 @@ impl Collidable for RigidBody {
     fn intersect(&self) -> Option<&dyn Intersect> {
         self.intersect.as_deref()
     }
+
+    fn one_way(&self, _part: usize) -> Option<Vec3> {
+        self.one_way?.try_normalize(0.0)
+    }
 }
 
 impl CameraCarrier for RigidBody {

@@ -56,6 +56,7 @@ mod mesh_frame;
 mod meshes;
 mod mimic;
 mod moving_contact;
+mod one_way;
 mod overlaps;
 mod pair_materials;
 mod paradox;

@@ -434,6 +434,10 @@ class RigidBody:
     @gravity_scale.setter
     def gravity_scale(self, value: float) -> None: ...
     @property
+    def one_way(self) -> _Floats | None: ...
+    @one_way.setter
+    def one_way(self, value: ArrayLike | None) -> None: ...
+    @property
     def locked(self) -> tuple[LockedAxis, ...]:
         """Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
         along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
@@ -2347,6 +2351,7 @@ class World:
         locked: Sequence[LockedAxis] | None = None,
         non_spinning: bool = False,
         intersect: Intersect | None = None,
+        one_way: ArrayLike | None = None,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -2380,6 +2385,7 @@ class World:
         mask: int | Sequence[int] | None = None,
         sensor: bool = False,
         intersect: Intersect | None = None,
+        one_way: ArrayLike | None = None,
     ) -> RigidBody:
         """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
         group, mask, sensor, intersect: as in ``add_rigid``.

@@ -426,6 +426,20 @@ impl RigidBody {
         self.change(py, |body| body.gravity_scale = value)
     }
 
+    /// Direction, shape (3,), frame of the shape, any length above 0, of a body that collides on one side only, such as
+    /// open terrain or a one-way platform: with what comes against it. What comes from the other side passes. None for
+    /// a body that collides on all sides.
+    #[getter]
+    fn one_way<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyArray1<f64>>>> {
+        Ok(self.constant(|body| body.one_way)?.map(|direction| array(py, direction.as_slice())))
+    }
+
+    #[setter]
+    fn set_one_way(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let direction = value.map(|value| vec3(value, "one_way")).transpose()?;
+        self.change(py, |body| body.one_way = direction)
+    }
+
     /// Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
     /// along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
     /// them). Setting it clears the velocity along these axes.

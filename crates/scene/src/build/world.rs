@@ -250,6 +250,7 @@ impl SceneFile {
         body.angular_damping = spec.angular_damping_per_s;
         (body.gravity_scale, body.locked) = (spec.gravity_scale, spec.locked);
         (body.group, body.mask, body.sensor) = (spec.group, spec.mask, spec.sensor);
+        body.one_way = spec.one_way.map(Vec3::from);
         Ok(body)
     }
 

@@ -155,6 +155,7 @@ impl Assembly<'_, '_> {
             group: surface.group,
             mask: surface.mask,
             sensor: false,
+            one_way: None,
             enabled: true,
             visible: true,
             sound: None,

@@ -78,6 +78,8 @@ pub struct BodySpec {
     /// Is a sensor: it has no contacts, and the world reports the bodies that overlap it. Default
     /// false.
     pub sensor: bool,
+    /// Direction, in the shape's frame, of a body that collides on one side only. Default none.
+    pub one_way: Option<[f64; 3]>,
     /// Takes part in the simulation. Default true.
     pub enabled: bool,
     /// Is drawn. Default true.
@@ -135,6 +137,7 @@ impl BodySpec {
             group: read_group(f, CollisionGroup::default()),
             mask: read_mask(f, u64::MAX),
             sensor: f.flag_or("sensor", false),
+            one_way: read_direction(f, "one_way"),
             enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
             sound: read_sound(f),
@@ -180,6 +183,17 @@ pub(crate) fn read_mask(f: &mut Fields<'_>, default: u64) -> u64 {
         return u64::MAX;
     };
     groups.iter().fold(0, |mask, group| mask | 1 << f.as_integer("mask", group, GROUPS))
+}
+
+/// Reads a direction of any length above 0.
+fn read_direction(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 3]> {
+    let direction = f.optional_vector(key, Bound::ANY)?;
+    if direction == [0.0; 3]
+        && let Some(value) = f.value(key)
+    {
+        f.wrong(key, value, "a direction, such as [0, 0, 1]");
+    }
+    Some(direction)
 }
 
 /// Reads the names of locked axes.

@@ -56,6 +56,7 @@ impl Writer<'_> {
         t.put_unless(0.0, "angular_damping_per_s", body.angular_damping);
         t.extend(surface::groups(body.group, body.mask));
         t.put_unless(false, "sensor", body.sensor);
+        body.one_way.iter().for_each(|direction| t.put("one_way", *direction));
         let templates = self.like.templates.iter().map(|template| &template.body);
         let known = self.like.bodies.iter().chain(templates).find(|spec| spec.name == name);
         known.and_then(|spec| spec.sound.as_ref()).iter().for_each(|sound| t.put("sound", *sound));

@@ -236,6 +236,7 @@ fn made_in_code() -> World {
     let sled = RigidBody::new(Shape::compound(parts.into()).unwrap()).with_name("sled").with_pose(tilted(-9.0));
     let plain = Material { friction: 0.3, ..Material::default() };
     let sled = sled.with_material(plain).with_shape_material(0, odd).with_shape_material(2, plain);
+    let sled = sled.with_one_way(Vec3::new(0.1, 0.2, 2.0));
     world.add(sled.with_shape_material(3, Material { friction: 0.01, ..plain })).unwrap();
     add_crane(&mut world, mesh);
     add_joints(&mut world);

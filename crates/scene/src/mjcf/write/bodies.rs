@@ -69,6 +69,9 @@ impl MjcfWriter<'_> {
         if let Some(label) = label.filter(|_| !matches!(body.shape(), Shape::Compound(_))) {
             common.put("name", label);
         }
+        if body.one_way.is_some() {
+            self.note(name, "bodies that collide on one side only collide on all sides in MuJoCo");
+        }
         if parts.is_sensor(0) {
             self.note(name, "bodies that only report overlaps do not collide in MuJoCo, and report nothing");
         }
