@@ -10,6 +10,7 @@ pub mod derivatives;
 pub mod description;
 pub mod handle;
 pub mod joint;
+pub mod joint_constants;
 pub mod joints;
 pub mod mimic;
 pub mod place;

@@ -14,7 +14,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
 use std::sync::Arc;
 use tumble::collide::Shape as Solid;
-use tumble::dynamics::{ArticulatedBody, Event, EventKind, ObjectId};
+use tumble::dynamics::{ArticulatedBody, Collidable, Event, EventKind, ObjectId};
 
 /// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
 const FIELDS: [(&str, &str, usize); 9] = [
@@ -64,8 +64,8 @@ pub fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
 pub fn shape_number(inner: &Inner, id: ObjectId, part: usize, shape: usize) -> i64 {
     let before = inner.world.get::<ArticulatedBody>(id).map_or(0, |body| {
         let count = |solid: &Solid| if let Solid::Compound(compound) = solid { compound.parts().len() } else { 1 };
-        let link = body.link_of(part);
-        body.colliders().take(part).filter(|(of, _)| *of == link).map(|(_, collider)| count(&collider.shape)).sum()
+        let earlier = body.colliders_of(body.link_of(part)).filter(|other| *other < part);
+        earlier.filter_map(|other| Collidable::shape(body, other)).map(count).sum()
     });
     (before + shape) as i64
 }
