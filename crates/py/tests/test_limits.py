@@ -187,14 +187,14 @@ def test_constants_of_joints_are_set_while_they_move():
     wheel = world.add_articulation(builder)
     constants = wheel.joint_damping, wheel.joint_friction, wheel.stiffness, wheel.rest
     assert np.ravel(constants).tolist() == [0.05, 0, 2, 0.3]
-    wheel.stiffness, wheel.rest, wheel.qd = 0, 0, 5
+    wheel.stiffness, wheel.rest, wheel.qd = 0, 0, [5]
     world.step(500)
     assert wheel.qd[0] == pytest.approx(5 * np.exp(-0.5 * 0.05 / 0.1), rel=1e-6)
-    wheel.joint_damping, wheel.joint_friction, wheel.qd = 0, 0.2, 5
+    wheel.joint_damping, wheel.joint_friction, wheel.qd = 0, 0.2, [5]
     world.step(500)
     assert wheel.qd[0] == pytest.approx(5 - 0.5 * 0.2 / 0.1, rel=1e-6)
     wheel.joint_friction, wheel.stiffness, wheel.rest = 0, 40, 1.0
-    wheel.q, wheel.qd = 1.2, 0
+    wheel.q, wheel.qd = [1.2], [0]
     copies = [world.fork(), pickle.loads(pickle.dumps(world))]
     world.step(500)
     assert wheel.q[0] == pytest.approx(1.0 + 0.2 * np.cos(np.sqrt(40 / 0.1) * 0.5), abs=1e-5)
@@ -203,11 +203,11 @@ def test_constants_of_joints_are_set_while_they_move():
         assert (other.state == world.state).all()
     wheel.stiffness = 0
     wheel.limits = [(-np.inf, 1.5)]
-    wheel.q, wheel.qd = 1.4, 3
+    wheel.q, wheel.qd = [1.4], [3]
     world.step(200)
     assert wheel.q[0] == pytest.approx(1.5, abs=1e-5)
     wheel.limits = [(-np.inf, np.inf)]
-    wheel.qd = 3
+    wheel.qd = [3]
     world.step(200)
     assert wheel.q[0] == pytest.approx(1.5 + 3 * 0.2, abs=1e-5)
     for name, value, words in [("limits", [(1, 0)], "limit"), ("limits", (0, 1), "shape"), ("joint_damping", -1, "damping"), ("stiffness", [1, 2], "shape")]:

@@ -105,7 +105,7 @@ pub struct PartSurface {
     pub contact: Material,
 }
 
-/// What a shape refers to.
+/// Meshes and materials that a shape refers to.
 #[derive(Clone, Copy)]
 pub(crate) struct ShapeContext<'a> {
     pub meshes: &'a BTreeMap<&'a str, Option<usize>>,
