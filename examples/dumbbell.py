@@ -8,17 +8,11 @@ across = 2 * END * ARM**2
 world = tumble.World(gravity=(0, 0, 0), stepper="backtracking", integrator="dormand_prince", integrator_tolerance=1e-10)
 spin = np.array([0.5, 0.0, 8.0])  # rad/s, along the axes of the body: z is the rod
 bell = world.add_rigid("bell", tumble.Capsule(0.02, 0.6), mass=2 * END, inertia=(across, across, ROD), angular_velocity=spin)
-
-
-def in_body(vector: np.ndarray) -> np.ndarray:
-    """A vector of the world in the axes of the body."""
-    *axis, w = bell.orientation
-    return vector + 2 * np.cross(axis, np.cross(axis, vector) - w * vector)
-
+gyroscope = world.add_sensor("gyroscope", bell)  # the angular velocity in the axes of the body
 
 rate, errors = (ROD - across) / across * spin[2], []  # I₁ω̇₁ = (I₂ - I₃)ω₂ω₃ of a body with I₁ = I₂
 for _ in range(480):
     world.step()
     there = spin[0] * np.cos(rate * world.time), spin[0] * np.sin(rate * world.time), spin[2]
-    errors.append(np.abs(in_body(bell.angular_velocity) - there).max())
+    errors.append(np.abs(gyroscope.value - there).max())
 print(f"precession of {rate:.3f} rad/s in the body: within {max(errors):.1e} rad/s for {world.time:.0f} s")

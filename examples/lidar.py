@@ -11,7 +11,7 @@ world.add_static("column", tumble.Cylinder(RADIUS, 3), position=(AWAY, 0, 1.5))
 
 angles = np.linspace(-np.pi, np.pi, 720, endpoint=False)
 beams = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(720)])
-scan = world.cast_rays((0, 0, 1), beams, max_distance=20.0)  # all at once: distance, body, part, face, normal
+scan = world.cast_rays((0, 0, 1), beams, max_distance=20.0)  # all at once: distance, body, part, shape, face, normal
 
 wall = HALF / np.abs(beams[:, :2]).max(axis=1)  # a square, seen from its center
 inside = AWAY**2 * beams[:, 0] ** 2 - AWAY**2 + RADIUS**2  # of the root in |d·t - c|² = r²

@@ -2,8 +2,10 @@
 //! one thread with tumble and with parry's tree of boxes, as Rapier casts rays.
 //!
 //! ```text
-//! cargo bench --bench rays
+//! cargo bench --bench rays [-- --write FOLDER]
 //! ```
+//!
+//! `--write` leaves the scene and the distances in a folder, for `benches/python/lidar.py`, which adds MuJoCo.
 //!
 //! Both build what depends on the poses anew for every scan: tumble's world does so by itself, and
 //! parry's tree is built from the boxes. The trees of the mesh are built once. The hits are
@@ -92,6 +94,40 @@ fn rays() -> Vec<Ray> {
         .collect()
 }
 
+/// Writes a line of sizes and pose for each body, the mesh, the directions of the rays, and the distances.
+fn write(folder: &std::path::Path, scene: &[Both], rays: &[Ray], distances: &[Option<f64>]) {
+    let line = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(" ") + "\n";
+    let (mut bodies, mut vertices, mut triangles) = (String::new(), String::new(), String::new());
+    for Both { ours, pose, .. } in scene {
+        let sizes = match ours {
+            Shape::Sphere { radius } => [0.0, *radius, 0.0, 0.0],
+            Shape::Box { half_extents: h } => [1.0, h.x, h.y, h.z],
+            Shape::Capsule { radius, half_length } => [2.0, *radius, *half_length, 0.0],
+            Shape::Mesh(mesh) => {
+                let (mesh, center) = (mesh.mesh(), mesh.center_of_mass());
+                vertices = mesh.vertices.iter().map(|v| line((v + center).as_slice())).collect();
+                triangles = mesh.triangles.iter().map(|t| line(&t.map(f64::from))).collect();
+                [3.0, 0.0, 0.0, 0.0]
+            }
+            _ => unreachable!("four kinds of shapes"),
+        };
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        bodies += &line(&[&sizes[..], t.as_slice(), q.as_slice()].concat());
+    }
+    let directions: String = rays.iter().map(|ray| line(ray.direction.as_slice())).collect();
+    let distances: String = distances.iter().map(|d| line(&[d.unwrap_or(-1.0)])).collect();
+    let files = [
+        ("bodies", bodies),
+        ("vertices", vertices),
+        ("triangles", triangles),
+        ("directions", directions),
+        ("distances", distances),
+    ];
+    for (name, text) in files {
+        std::fs::write(folder.join(format!("{name}.txt")), text).unwrap();
+    }
+}
+
 fn main() {
     let (scene, rays) = (scene(), rays());
     let mut world = World::default();
@@ -135,6 +171,10 @@ fn main() {
         (a, b) => a.is_some() != b.is_some(),
     });
     println!("{} rays hit something; {} differ", ours.iter().flatten().count(), different.count());
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(k) = arguments.iter().position(|argument| argument == "--write") {
+        write(std::path::Path::new(&arguments[k + 1]), &scene, &rays, &ours);
+    }
     for (name, times) in ["tumble", "parry"].iter().zip(&mut times) {
         times.sort_by(f64::total_cmp);
         println!("{name}: {:.1} ms of CPU per scan", 1e3 * times[SCANS / 2]);

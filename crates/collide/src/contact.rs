@@ -26,6 +26,8 @@ pub struct Contact {
     pub core_b: f64,
     /// The feature that determines the normal.
     pub normal_from: NormalFrom,
+    /// The shapes that touch, of A and of B: the index of a compound's part; 0 for all other shapes.
+    pub shapes: [u32; 2],
 }
 
 /// The feature that determines a contact's normal, and so how the normal rotates when the bodies
@@ -83,7 +85,8 @@ impl Contact {
             NormalFrom::FaceOfB => NormalFrom::FaceOfA,
             other => other,
         };
-        Contact { normal: -self.normal, core_a: self.core_b, core_b: self.core_a, normal_from, ..self }
+        let shapes = [self.shapes[1], self.shapes[0]];
+        Contact { normal: -self.normal, core_a: self.core_b, core_b: self.core_a, normal_from, shapes, ..self }
     }
 
     /// Returns the contact of two spheres about core points. Coincident centers are separated along
@@ -102,6 +105,7 @@ impl Contact {
             core_a: radius_a,
             core_b: radius_b,
             normal_from: NormalFrom::CorePoints,
+            shapes: [0; 2],
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Distances: from a point to a shape, and between two shapes.
 
 use crate::shape::{Cone, ellipsoid};
-use crate::{Contact, Pose, Shape, Vec3, contacts};
+use crate::{CompoundShape, Contact, Pose, Shape, Vec3, contacts};
 
 /// Maximum number of alternating projections.
 const PROJECTIONS: usize = 16;
@@ -19,6 +19,8 @@ pub struct SurfacePoint {
     pub distance: f64,
     /// Outward unit normal: from the surface to a point outside, from a point inside to the surface.
     pub normal: Vec3,
+    /// The shape: the index of a compound's part; 0 for all other shapes.
+    pub shape: u32,
 }
 
 /// The closest points of two shapes, world axes.
@@ -30,6 +32,8 @@ pub struct ClosestPair {
     pub points: [Vec3; 2],
     /// Unit normal from B towards A.
     pub normal: Vec3,
+    /// The shapes that the points are of, of A and of B: the index of a compound's part; 0 for all others.
+    pub shapes: [u32; 2],
 }
 
 impl Shape {
@@ -38,8 +42,12 @@ impl Shape {
     /// of the part in which the given point is deepest. The first call builds the tree of a mesh.
     pub fn closest_point(&self, pose: &Pose, point: &Vec3) -> SurfacePoint {
         let p = pose.inverse_transform_point(&(*point).into()).coords;
-        let (q, distance, normal) = self.closest_local(&p);
-        SurfacePoint { point: pose.transform_point(&q.into()).coords, distance, normal: pose.rotation * normal }
+        let ((q, distance, normal), shape) = match self {
+            Shape::Compound(compound) => closest_of_compound(compound, &p),
+            _ => (self.closest_local(&p), 0),
+        };
+        let (point, normal) = (pose.transform_point(&q.into()).coords, pose.rotation * normal);
+        SurfacePoint { point, distance, normal, shape }
     }
 
     /// Returns the closest point of the surface, the signed distance and the normal, in the shape's
@@ -89,16 +97,7 @@ impl Shape {
                 let offset = (p - closest.point) * closest.signed_distance.signum();
                 (closest.point, closest.signed_distance, offset.try_normalize(0.0).unwrap_or(flat))
             }
-            Shape::Compound(compound) => {
-                let mut least = (*p, f64::INFINITY, Vec3::z());
-                for (part, own) in compound.placed() {
-                    let found = part.closest_point(own, p);
-                    if found.distance < least.1 {
-                        least = (found.point, found.distance, found.normal);
-                    }
-                }
-                least
-            }
+            Shape::Compound(compound) => closest_of_compound(compound, p).0,
             Shape::Ellipsoid { half_axes } => {
                 let found = ellipsoid::closest(half_axes, p);
                 (found.point, found.distance, found.normal)
@@ -115,6 +114,18 @@ impl Shape {
             }
         }
     }
+}
+
+/// Returns the closest point of the surface of a compound, and the index of its part.
+fn closest_of_compound(compound: &CompoundShape, p: &Vec3) -> ((Vec3, f64, Vec3), u32) {
+    let mut least = ((*p, f64::INFINITY, Vec3::z()), 0);
+    for (n, (part, own)) in (0..).zip(compound.placed()) {
+        let found = part.closest_point(own, p);
+        if found.distance < least.0.1 {
+            least = ((found.point, found.distance, found.normal), n);
+        }
+    }
+    least
 }
 
 /// The surface at `radius` around a core point.
@@ -159,9 +170,9 @@ pub fn closest_points(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Opt
 /// Returns a pair of points of the two surfaces, by alternating projections from a point of A. Its
 /// distance never increases. It is exact for convex bodies in the limit, and 0 if they overlap.
 fn projected(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, mut from: Vec3) -> ClosestPair {
-    let mut best = ClosestPair { distance: f64::INFINITY, points: [from; 2], normal: Vec3::z() };
+    let mut best = ClosestPair { distance: f64::INFINITY, points: [from; 2], normal: Vec3::z(), shapes: [0; 2] };
     for _ in 0..PROJECTIONS {
-        let to = b.closest_point(pose_b, &from).point;
+        let SurfacePoint { point: to, shape, .. } = b.closest_point(pose_b, &from);
         let back = a.closest_point(pose_a, &to);
         let offset = back.point - to;
         let distance = offset.norm();
@@ -169,7 +180,7 @@ fn projected(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, mut from: Vec3)
             break;
         }
         let normal = offset.try_normalize(0.0).unwrap_or(-back.normal);
-        best = ClosestPair { distance, points: [back.point, to], normal };
+        best = ClosestPair { distance, points: [back.point, to], normal, shapes: [back.shape, shape] };
         from = back.point;
     }
     best
@@ -182,6 +193,7 @@ impl ClosestPair {
             distance: contact.gap,
             points: [contact.point + half, contact.point - half],
             normal: contact.normal,
+            shapes: contact.shapes,
         }
     }
 }

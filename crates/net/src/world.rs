@@ -98,7 +98,20 @@ pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
     let point = |c: &Contact| {
         let (&(a, part_a), &(b, part_b)) = (entities.get(c.a as usize)?, entities.get(c.b as usize)?);
         let (point, normal, force, zero) = (c.point.into(), c.normal.into(), c.force.into(), Vec3::zeros());
-        Some(ContactPoint { a, part_a, b, part_b, point, normal, depth: c.depth, velocity: zero, impulse: zero, force })
+        Some(ContactPoint {
+            a,
+            part_a,
+            shape_a: 0,
+            b,
+            part_b,
+            shape_b: 0,
+            point,
+            normal,
+            depth: c.depth,
+            velocity: zero,
+            impulse: zero,
+            force,
+        })
     };
     world.replica().set_contacts(contacts.iter().filter_map(point));
 }

@@ -141,3 +141,58 @@ def test_arrays_of_all_bodies():
     with pytest.raises(tumble.InvalidValueError, match="finite"):
         world.velocities = np.full((5, 3), np.nan)
     assert world.save() == before, "nothing is written on an error"
+
+
+def sled(world):
+    runner = tumble.Capsule(0.05, 0.8)
+    turn = (0, np.sqrt(0.5), 0, np.sqrt(0.5))
+    shape = tumble.Compound([(tumble.Box((0.6, 0.9, 0.06)), (0, 0, 0.12)), (runner, (0, 0.5, 0.05), turn), (runner, (0, -0.5, 0.05), turn)])
+    return world.add_rigid("sled", shape, mass=2, velocity=(20, 0, 0), friction=0.3)
+
+
+def test_parts_have_surface_constants_of_their_own(tmp_path):
+    world = tumble.World()
+    world.add_static("ground", tumble.HalfSpace(), friction=1)
+    body = sled(world)
+    body.set_shape_material(1, friction=0.01, adhesion=2)
+    body.set_shape_material(1, restitution=0.5)
+    body.set_shape_material(2, friction_scale=(1, 2, 1), surface_velocity=(0.1, 0, 0))
+    assert [body.shape_material(k)["friction"] for k in range(3)] == [0.3, 0.01, 0.3]
+    assert (body.shape_material(1)["adhesion"], body.shape_material(1)["restitution"]) == (2, 0.5)
+    assert body.shape_material(2)["friction_scale"].tolist() == [1, 2, 1]
+    world.save_scene(tmp_path / "sled.toml")
+    copies = [world.fork(), tumble.World.load(tmp_path / "sled.toml"), pickle.loads(pickle.dumps(world))]
+    for other in [world, *copies]:
+        other.step(60)
+        assert (other.state == world.state).all()
+    assert abs(float(body.angular_velocity[2])) > 0.01
+    body.set_shape_material(1)
+    assert body.shape_material(1)["friction"] == 0.3 and body.shape_material(1)["adhesion"] == 0
+    for call, words in [
+        (lambda: body.set_shape_material(3, friction=1), "index of a shape"),
+        (lambda: body.set_shape_material(1, friction=-1), "friction"),
+        (lambda: body.set_shape_material(1, friction_scale=(1, 2)), "friction_scale"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            call()
+
+
+def test_a_one_way_body_collides_from_one_side(tmp_path):
+    world = tumble.World()
+    platform = world.add_static("platform", tumble.Box((1, 1, 0.1)), position=(0, 0, 1), one_way=(0, 0, 2))
+    assert platform.one_way.tolist() == [0, 0, 2]
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1, position=(0, 0, 0.2), velocity=(0, 0, 6))
+    world.save_scene(tmp_path / "platform.toml")
+    copies = [world.fork(), tumble.World.load(tmp_path / "platform.toml"), pickle.loads(pickle.dumps(world))]
+    heights = []
+    for _ in range(480):
+        world.step()
+        heights.append(float(ball.position[2]))
+    assert max(heights) == pytest.approx(0.2 + 36 / (2 * 9.81), abs=2e-3) and heights[-1] == pytest.approx(1.15, abs=1e-3)
+    for other in copies:
+        other.step(480)
+        assert (other.state == world.state).all()
+    platform.one_way = None
+    assert platform.one_way is None
+    with pytest.raises(ValueError, match="one-way direction"):
+        platform.one_way = (0, 0, 0)

@@ -177,3 +177,39 @@ def test_a_urdf_without_joints_is_a_table(tmp_path):
         other.step(60)
         fork.step(60)
         assert (other.state == fork.state).all()
+
+
+def test_constants_of_joints_are_set_while_they_move():
+    """A wheel of 0.1 kg·m²: free, braked by damping and by dry friction, swinging on a spring, stopped by a limit."""
+    builder = tumble.ArticulationBuilder("wheel")
+    builder.add_link("wheel", axis=(0, 0, 1), mass=1, center_of_mass=(0, 0, 0), inertia=(0.1, 0.1, 0.1), joint_damping=0.05, stiffness=2, rest=0.3)
+    world = tumble.World(gravity=(0, 0, 0), dt=1 / 1000, stepper="backtracking", integrator="dormand_prince", integrator_tolerance=1e-10)
+    wheel = world.add_articulation(builder)
+    constants = wheel.joint_damping, wheel.joint_friction, wheel.stiffness, wheel.rest
+    assert np.ravel(constants).tolist() == [0.05, 0, 2, 0.3]
+    wheel.stiffness, wheel.rest, wheel.qd = 0, 0, [5]
+    world.step(500)
+    assert wheel.qd[0] == pytest.approx(5 * np.exp(-0.5 * 0.05 / 0.1), rel=1e-6)
+    wheel.joint_damping, wheel.joint_friction, wheel.qd = 0, 0.2, [5]
+    world.step(500)
+    assert wheel.qd[0] == pytest.approx(5 - 0.5 * 0.2 / 0.1, rel=1e-6)
+    wheel.joint_friction, wheel.stiffness, wheel.rest = 0, 40, 1.0
+    wheel.q, wheel.qd = [1.2], [0]
+    copies = [world.fork(), pickle.loads(pickle.dumps(world))]
+    world.step(500)
+    assert wheel.q[0] == pytest.approx(1.0 + 0.2 * np.cos(np.sqrt(40 / 0.1) * 0.5), abs=1e-5)
+    for other in copies:
+        other.step(500)
+        assert (other.state == world.state).all()
+    wheel.stiffness = 0
+    wheel.limits = [(-np.inf, 1.5)]
+    wheel.q, wheel.qd = [1.4], [3]
+    world.step(200)
+    assert wheel.q[0] == pytest.approx(1.5, abs=1e-5)
+    wheel.limits = [(-np.inf, np.inf)]
+    wheel.qd = [3]
+    world.step(200)
+    assert wheel.q[0] == pytest.approx(1.5 + 3 * 0.2, abs=1e-5)
+    for name, value, words in [("limits", [(1, 0)], "limit"), ("limits", (0, 1), "shape"), ("joint_damping", -1, "damping"), ("stiffness", [1, 2], "shape")]:
+        with pytest.raises(ValueError, match=words):
+            setattr(wheel, name, value)

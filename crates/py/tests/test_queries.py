@@ -110,3 +110,39 @@ def test_a_link_of_an_arm_is_named():
     hits = world.cast_rays(arm.link_poses()[:, :3] + (0, 0, 3), (0, 0, -1))
     named = {arm.link_names[part] for part in hits["part"][hits["body"] == 0]}
     assert len(named) >= 2
+
+
+def test_results_name_the_shape_of_a_compound_and_of_a_link():
+    compound = tumble.Compound([(tumble.Box(0.4), (-1, 0, 0)), (tumble.Sphere(0.2), (0, 0, 0)), (tumble.Cylinder(0.2, 0.4), (1, 0, 0))])
+    world = tumble.World(gravity=(0, 0, 0))
+    world.add_rigid("row", compound, mass=1)
+    links = tumble.ArticulationBuilder("arm")
+    links.add_link("upper", joint="fixed", shape=tumble.Box(0.4))
+    links.add_shape("upper", compound, (0, 2, 0))
+    links.add_shape("upper", tumble.Sphere(0.2), (0, 4, 0))
+    links.add_link("lower", "upper", axis=(1, 0, 0), position=(0, 6, 0), shape=tumble.Sphere(0.2))
+    world.add_articulation(links, base=(0, 10, 0))
+    xs, ys = [-1, 0, 1, 0, -1, 0, 1, 0, 0], [0, 0, 0, 10, 12, 12, 12, 14, 16]
+    hits = world.cast_rays(np.column_stack([xs, ys, np.full(9, 5.0)]), (0, 0, -1))
+    assert hits["body"].tolist() == [0] * 3 + [1] * 6
+    assert hits["part"].tolist() == [0] * 8 + [1]
+    # the parts of the compound count one by one among the shapes of the link
+    assert hits["shape"].tolist() == [0, 1, 2, 0, 1, 2, 3, 4, 0]
+    assert hits["face"].tolist() == [5, 0, 2, 5, 5, 0, 2, 0, 0]
+    probe = tumble.Sphere(0.1)
+    for shape, x in enumerate([-1.0, 0.0, 1.0]):
+        assert world.overlaps(probe, position=(x, 0, 0.25))["shape"].tolist() == [shape]
+        assert world.closest_points(probe, position=(x, 0, 1))["shapes"].tolist() == [-1, shape]
+        assert world.cast_shape(probe, (0, 0, -1), 3, position=(x, 0, 2))["shape"] == shape
+        assert world.point_depth((x, 0, 0.1))["shape"] == shape
+    assert world.cast_rays((9, 9, 9), (0, 0, 1))["shape"].tolist() == [-1]
+
+
+def test_contacts_name_the_part_of_a_compound():
+    table = [(tumble.Box((1.2, 1.2, 0.1)), (0, 0, 0.5))] + [(tumble.Sphere(0.1), (x, y, 0.1)) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+    world = tumble.World()
+    world.add_static("ground", tumble.HalfSpace())
+    world.add_rigid("table", tumble.Compound(table), mass=5)
+    world.step(10)
+    assert sorted(world.contacts["shapes"].tolist()) == [[0, 1], [0, 2], [0, 3], [0, 4]]
+    assert (world.fork().contacts["shapes"] == world.contacts["shapes"]).all()

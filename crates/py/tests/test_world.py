@@ -159,7 +159,7 @@ def test_a_compound_has_the_densities_of_its_parts():
     assert body.mass == pytest.approx(4000 * volume)
     assert body.position == pytest.approx([0, 0, 2])
     assert world.add_rigid("even", tumble.Compound([part[:2] for part in parts])).mass == pytest.approx(2000 * volume)
-    assert world.cast_rays((0.4, 0, 9), (0, 0, -1))["face"].tolist() == [1]
+    assert world.cast_rays((0.4, 0, 9), (0, 0, -1))["shape"].tolist() == [1]
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ impl Torus {
                 let normal = arm / distance;
                 let (core_a, core_b, normal_from) = (self.minor, radius, NormalFrom::LineOfA(along));
                 let point = center + (radius + 0.5 * gap) * normal;
-                out.push(Contact { point, normal, gap, feature, core_a, core_b, normal_from });
+                out.push(Contact { point, normal, gap, feature, core_a, core_b, normal_from, shapes: [0; 2] });
             }
         });
     }
@@ -76,7 +76,7 @@ impl Torus {
             if gap <= margin {
                 let (core_b, normal_from) = (0.0, NormalFrom::FaceOfB);
                 let point = point - (self.minor + 0.5 * gap) * normal;
-                out.push(Contact { point, normal, gap, feature, core_a, core_b, normal_from });
+                out.push(Contact { point, normal, gap, feature, core_a, core_b, normal_from, shapes: [0; 2] });
             }
         });
     }

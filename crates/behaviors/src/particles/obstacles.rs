@@ -91,7 +91,9 @@ impl<'a> Obstacles<'a> {
                     angular: turn / frame.dt,
                 });
                 let (material, dynamic) = (body.material(part), dynamic && body.part_moves(part));
-                for (shape, placed) in pieces(shape) {
+                for (number, (shape, placed)) in pieces(shape).into_iter().enumerate() {
+                    let own = body.shape_materials(part).iter().find(|(shape, _)| *shape == number);
+                    let material = own.map_or(material, |(_, material)| *material);
                     let at = |pose: &Pose| shape.tight_aabb(&placed.map_or(*pose, |placed| pose * placed));
                     let [a, b] = [at(&before), at(&state.pose)];
                     let bounds = Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) }.grown(radius + sweep);

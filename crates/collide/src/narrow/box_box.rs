@@ -175,6 +175,7 @@ fn edge_contact(f: &BoxPair, edge: &EdgeAxis) -> Contact {
         core_a: 0.0,
         core_b: 0.0,
         normal_from: NormalFrom::Edges,
+        shapes: [0; 2],
     }
 }
 
@@ -271,6 +272,6 @@ impl<'a> FaceView<'a> {
         } else {
             (middle, -outward, NormalFrom::FaceOfA)
         };
-        Contact { point, normal, gap, feature, core_a: 0.0, core_b: 0.0, normal_from }
+        Contact { point, normal, gap, feature, core_a: 0.0, core_b: 0.0, normal_from, shapes: [0; 2] }
     }
 }

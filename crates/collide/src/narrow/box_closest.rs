@@ -45,7 +45,16 @@ fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
         _ => NormalFrom::CorePoints,
     };
     let feature = (2 << 20) | region(&p, &f.a) << 8 | feature_of_b(axis, k1, k2, corner, s);
-    Some(Contact { point: 0.5 * (p + q), normal: offset / gap, gap, feature, core_a: 0.0, core_b: 0.0, normal_from })
+    Some(Contact {
+        point: 0.5 * (p + q),
+        normal: offset / gap,
+        gap,
+        feature,
+        core_a: 0.0,
+        core_b: 0.0,
+        normal_from,
+        shapes: [0; 2],
+    })
 }
 
 /// Returns the feature: within an edge its axis and corner, at an end the signs of the vertex,

@@ -150,6 +150,7 @@ fn separated_cores(core: &CoreSegment, s: f64, half: &Vec3, margin: f64, out: &m
             core_a: radius,
             core_b: 0.0,
             normal_from: if edge_on_edge { NormalFrom::Edges } else { NormalFrom::CorePoints },
+            shapes: [0; 2],
         });
     }
 }
@@ -187,6 +188,7 @@ fn push_on_face(core: &CoreSegment, half: &Vec3, (k, sign): (usize, f64), margin
                 core_a: radius,
                 core_b: 0.0,
                 normal_from: NormalFrom::FaceOfB,
+                shapes: [0; 2],
             });
         }
     }
@@ -217,6 +219,7 @@ fn crossing_cores(core: &CoreSegment, half: &Vec3, margin: f64, out: &mut Vec<Co
                 core_a: *radius,
                 core_b: 0.0,
                 normal_from: NormalFrom::Edges,
+                shapes: [0; 2],
             });
         }
         _ => {

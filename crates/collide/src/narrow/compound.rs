@@ -33,9 +33,9 @@ pub(super) fn contacts_of_compound(
     margin: f64,
     out: &mut Vec<Contact>,
 ) {
-    let (compound, pose, other, pose_other, sign) = match side {
-        Side::A(compound) => (compound, pose_a, b, pose_b, 0.5),
-        Side::B(compound) => (compound, pose_b, a, pose_a, -0.5),
+    let (compound, pose, other, pose_other, sign, own_side) = match side {
+        Side::A(compound) => (compound, pose_a, b, pose_b, 0.5, 0),
+        Side::B(compound) => (compound, pose_b, a, pose_a, -0.5, 1),
     };
     let near = other.aabb(&pose.inv_mul(pose_other)).grown(margin);
     let start = out.len();
@@ -60,7 +60,8 @@ pub(super) fn contacts_of_compound(
         let mut kept = first;
         for k in first..out.len() {
             // rotated, so that the numbers of parts of two compounds do not cancel
-            let contact = Contact { feature: out[k].feature.rotate_left(1) ^ name, ..out[k] };
+            let mut contact = Contact { feature: out[k].feature.rotate_left(1) ^ name, ..out[k] };
+            contact.shapes[own_side] = n as u32;
             if !is_buried(&contact) {
                 out[kept] = contact;
                 kept += 1;

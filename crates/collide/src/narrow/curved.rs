@@ -65,6 +65,15 @@ fn push(
     let gap = normal.dot(&(at.coords - origin));
     if gap <= margin {
         let point = at.coords - normal * (0.5 * gap);
-        out.push(Contact { point, normal, gap, feature, core_a, core_b: 0.0, normal_from: NormalFrom::FaceOfB });
+        out.push(Contact {
+            point,
+            normal,
+            gap,
+            feature,
+            core_a,
+            core_b: 0.0,
+            normal_from: NormalFrom::FaceOfB,
+            shapes: [0; 2],
+        });
     }
 }

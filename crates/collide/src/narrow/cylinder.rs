@@ -43,6 +43,7 @@ pub(super) fn half_space(
                     core_a,
                     core_b: 0.0,
                     normal_from: NormalFrom::FaceOfB,
+                    shapes: [0; 2],
                 });
             }
         };

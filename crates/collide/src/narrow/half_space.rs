@@ -17,6 +17,7 @@ fn push(core: Vec3, radius: f64, normal: &Vec3, origin: &Vec3, feature: u64, mar
             core_a: radius,
             core_b: 0.0,
             normal_from: NormalFrom::FaceOfB,
+            shapes: [0; 2],
         });
     }
 }

@@ -94,7 +94,7 @@ pub fn closest_point_within(shape: &Shape, pose: &Pose, point: &Vec3, limit: f64
         let (core, radius) = shape.core();
         let found = closest_point_within(&core, pose, point, limit + radius)?;
         let distance = found.distance - radius;
-        return Some(SurfacePoint { point: point - found.normal * distance, distance, normal: found.normal });
+        return Some(SurfacePoint { point: point - found.normal * distance, distance, normal: found.normal, shape: 0 });
     }
     let local = pose.inverse_transform_point(&(*point).into()).coords;
     let mut least: Option<(f64, Vec3)> = None;
@@ -111,7 +111,7 @@ pub fn closest_point_within(shape: &Shape, pose: &Pose, point: &Vec3, limit: f64
     }
     least.map(|(distance, normal)| {
         let normal = pose.rotation * normal;
-        SurfacePoint { point: point - normal * distance, distance, normal }
+        SurfacePoint { point: point - normal * distance, distance, normal, shape: 0 }
     })
 }
 

@@ -64,6 +64,7 @@ pub(super) fn sphere_box(radius: f64, pose_a: &Pose, half: &Vec3, pose_b: &Pose,
                 (false, Some(k)) => NormalFrom::LineOfB(pose_b.rotation * Vec3::ith(k, 1.0)),
                 (false, None) => NormalFrom::CorePoints,
             },
+            shapes: [0; 2],
         });
     }
 }

@@ -104,6 +104,7 @@ fn visit(tree: &SphereTree, pose: &Pose, primitive: &Shape, node: usize, found: 
         core_a: sphere.radius,
         core_b: sample.core,
         normal_from: if sample.face { NormalFrom::FaceOfB } else { NormalFrom::CorePoints },
+        shapes: [0; 2],
     });
 }
 

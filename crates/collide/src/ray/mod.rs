@@ -25,9 +25,11 @@ pub struct RayHit {
     pub normal: Vec3,
     /// The face: the index of a mesh's triangle; 0 to 5 for −x, +x, −y, +y, −z and +z of a box; 0,
     /// 1 and 2 for the side, the −z end and the +z end of a cylinder; 0 and 1 for the side and the base
-    /// of a cone; on a rounded edge the face whose normal is nearest; the index of a compound's part; 0
-    /// for all others.
+    /// of a cone; on a rounded edge the face whose normal is nearest; of a compound the face of the part
+    /// that it enters; 0 for all others.
     pub face: u32,
+    /// The shape: the index of a compound's part; 0 for all other shapes.
+    pub shape: u32,
 }
 
 /// Maximum number of entries into one part of a compound that are inside other parts.
@@ -48,10 +50,14 @@ impl Shape {
         let inverse = pose.rotation.inverse();
         let d = inverse * direction.try_normalize(0.0)?;
         let o = inverse * (origin - pose.translation.vector);
-        let (distance, normal, face) = self.cast_local(&o, &d, max_distance)?;
-        (distance <= max_distance).then(|| RayHit { distance, normal: pose.rotation * normal, face })
+        let ((distance, normal, face), shape) = match self {
+            Shape::Compound(compound) => compound_entry(compound, &o, &d, max_distance)?,
+            _ => (self.cast_local(&o, &d, max_distance)?, 0),
+        };
+        (distance <= max_distance).then(|| RayHit { distance, normal: pose.rotation * normal, face, shape })
     }
 
+    /// Returns the entry into any shape but a compound.
     fn cast_local(&self, o: &Vec3, d: &Vec3, max: f64) -> Option<LocalHit> {
         match self {
             Shape::HalfSpace => (o.z > 0.0 && d.z < 0.0).then(|| (-o.z / d.z, Vec3::z(), 0)),
@@ -90,7 +96,7 @@ impl Shape {
                 let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::z);
                 Some((hit.distance, normal, hit.triangle))
             }
-            Shape::Compound(compound) => compound_entry(compound, o, d, max),
+            Shape::Compound(_) => None,
             Shape::Ellipsoid { half_axes } => {
                 let scaled = d.component_div(half_axes);
                 let length = scaled.norm();
@@ -130,23 +136,23 @@ impl Shape {
     }
 }
 
-/// Returns where a ray enters a part from outside of all others.
-fn compound_entry(compound: &CompoundShape, o: &Vec3, d: &Vec3, max: f64) -> Option<LocalHit> {
+/// Returns where a ray enters a part from outside of all others, and the index of that part.
+fn compound_entry(compound: &CompoundShape, o: &Vec3, d: &Vec3, max: f64) -> Option<(LocalHit, u32)> {
     let nearest = o - d * o.dot(d);
     if nearest.norm() > compound.bounding_radius() {
         return None;
     }
     let step = STEP * compound.bounding_radius();
-    let mut best: Option<LocalHit> = None;
+    let mut best: Option<(LocalHit, u32)> = None;
     for (n, (part, own)) in compound.placed().enumerate() {
         let mut start = 0.0;
         for _ in 0..MAX_ENTRIES {
-            let limit = best.map_or(max, |best| best.0) - start;
+            let limit = best.map_or(max, |((distance, ..), _)| distance) - start;
             let Some(hit) = part.cast_ray(own, &(o + d * start), d, limit) else { break };
             let distance = start + hit.distance;
             if !compound.is_buried(n, &(o + d * distance)) {
-                if best.is_none_or(|best| distance < best.0) {
-                    best = Some((distance, hit.normal, n as u32));
+                if best.is_none_or(|((nearest, ..), _)| distance < nearest) {
+                    best = Some(((distance, hit.normal, hit.face), n as u32));
                 }
                 break;
             }

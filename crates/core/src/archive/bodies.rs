@@ -20,6 +20,7 @@ pub(super) struct RigidRecord {
     /// Mass, kg, and inertia, kg·m²; `None` for a fixed body.
     mass: Option<(f64, Mat3)>,
     material: Material,
+    shape_materials: Vec<(usize, Material)>,
     linear_damping: f64,
     angular_damping: f64,
     gravity_scale: f64,
@@ -30,6 +31,7 @@ pub(super) struct RigidRecord {
     group: CollisionGroup,
     mask: u64,
     sensor: bool,
+    one_way: Option<Vec3>,
     initial_pose: Pose,
     initial_velocity: [Vec3; 2],
     visuals: Vec<VisualRecord>,
@@ -44,6 +46,7 @@ impl RigidRecord {
             shape: tables.shapes.index(body.shape()),
             mass: (!body.is_fixed()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
+            shape_materials: body.shape_materials().to_vec(),
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
             gravity_scale: body.gravity_scale,
@@ -53,6 +56,7 @@ impl RigidRecord {
             group: body.group,
             mask: body.mask,
             sensor: body.sensor,
+            one_way: body.one_way,
             initial_pose: body.initial_pose,
             initial_velocity: [body.initial_velocity, body.initial_angular_velocity],
             visuals: body.visuals().iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
@@ -68,10 +72,14 @@ impl RigidRecord {
             None => RigidBody::fixed(shape),
         };
         let mut body = body.with_center_in_part(self.center);
+        for (shape, material) in self.shape_materials {
+            body.set_shape_material(shape, Some(material));
+        }
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.gravity_scale, body.locked) = (self.gravity_scale, self.locked);
         (body.group, body.mask, body.sensor) = (self.group, self.mask, self.sensor);
+        body.one_way = self.one_way;
         let [velocity, angular_velocity] = self.initial_velocity;
         let visuals = self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?;
         let body = body

@@ -152,6 +152,7 @@ impl LoopJointRecord {
 #[derive(Serialize, Deserialize)]
 pub(super) struct ContactRecord {
     sides: [(Option<u32>, usize); 2],
+    shapes: [usize; 2],
     /// Point, normal, velocity, impulse, force.
     vectors: [Vec3; 5],
     depth: f64,
@@ -161,6 +162,7 @@ impl ContactRecord {
     pub fn of(c: &ContactPoint, indices: &ObjectIndices) -> ContactRecord {
         ContactRecord {
             sides: [(indices.of_id(c.a), c.part_a), (indices.of_id(c.b), c.part_b)],
+            shapes: [c.shape_a, c.shape_b],
             vectors: [c.point, c.normal, c.velocity, c.impulse, c.force],
             depth: c.depth,
         }
@@ -168,12 +170,15 @@ impl ContactRecord {
 
     pub fn contact(self, ids: &[ObjectId]) -> ContactPoint {
         let [(a, part_a), (b, part_b)] = self.sides;
+        let [shape_a, shape_b] = self.shapes;
         let [point, normal, velocity, impulse, force] = self.vectors;
         ContactPoint {
             a: id(ids, a),
             part_a,
+            shape_a,
             b: id(ids, b),
             part_b,
+            shape_b,
             point,
             normal,
             depth: self.depth,

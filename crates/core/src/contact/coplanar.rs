@@ -96,10 +96,13 @@ fn tiles(
         let is_near = entries.iter().any(|e| e.other == tile.other && touches(e));
         let is_level = || {
             let pose = turn * around.part_states[tile.other as usize].pose;
-            let top = around.shape(tile.other).map(|shape| shape.tight_aabb(&pose).max.z);
+            // contacts with a compound name one of its shapes
+            let single = around.shape(tile.other).filter(|shape| !matches!(shape, Shape::Compound(_)));
+            let top = single.map(|shape| shape.tight_aabb(&pose).max.z);
             top.is_some_and(|top| (top - height).abs() <= FLUSH * LIFT * tolerance)
         };
         is_near
+            && around.is_plain(tile.other)
             && is_a(tile, constraints) == is_a(first, constraints)
             && velocity(tile.other) == velocity(first.other)
             && is_level()
@@ -122,11 +125,12 @@ fn contacts(
     let plane = Arc::new(FacePlane { state: around.plane_state(first), is_a });
     let ContactConstraint { a, b, .. } = constraints[first.contact as usize];
     let pair = moving_pair(around.objects, around.owners, around.part_states, [a, b], Some(&plane))?;
-    if pair.tests.any() {
+    let mover = if is_a { b } else { a };
+    if !around.is_plain(mover) {
         return None;
     }
     let mut found = Vec::new();
-    let margin = tiles.iter().map(|tile| (around.margin)(if is_a { b } else { a }, tile.other)).fold(0.0, f64::max);
+    let margin = tiles.iter().map(|tile| (around.margin)(mover, tile.other)).fold(0.0, f64::max);
     pair.contacts_at(&pair.part_states.map(|state| state.pose), margin, &mut found);
     if found.is_empty() || found.iter().any(|contact| contact.gap < -LIFT * tolerance) {
         return None;
@@ -147,6 +151,15 @@ fn contacts(
 }
 
 impl Surroundings<'_> {
+    /// Returns whether a part has one surface that collides on all sides by its shape.
+    fn is_plain(&self, part: u32) -> bool {
+        let owner = &self.owners[part as usize];
+        let part = owner.part as usize;
+        self.objects.at(owner.place as usize).object.collidable().is_some_and(|body| {
+            body.shape_materials(part).is_empty() && body.one_way(part).is_none() && body.intersect().is_none()
+        })
+    }
+
     /// Returns the state of the plane of a contact; it moves with the part that is touched.
     fn plane_state(&self, first: &Entry) -> PartState {
         let tile = &self.part_states[first.other as usize];

@@ -6,7 +6,8 @@ use crate::contact::laws::ContactLaws;
 use crate::contact::motion::Moved;
 use crate::contact::own_tests::OwnTests;
 use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
-use crate::contact::pair_material::{PairMaterials, Surface};
+use crate::contact::pair_material::PairMaterials;
+use crate::contact::surfaces::PairSurfaces;
 use crate::contact::time_of_impact::MovingPair;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
@@ -335,9 +336,15 @@ impl NarrowPhase<'_> {
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
-        let surface_a = (owner_a.id, part_a, body_a.material(part_a));
-        let surface_b = (owner_b.id, part_b, body_b.material(part_b));
-        if self.pair_materials.ignores(surface_a, surface_b) {
+        let surfaces = PairSurfaces {
+            settings: self.settings,
+            pair_materials: self.pair_materials,
+            part_states: [state_a, state_b],
+            whole: [(owner_a.id, part_a, body_a.material(part_a)), (owner_b.id, part_b, body_b.material(part_b))],
+            of_shapes: [body_a.shape_materials(part_a), body_b.shape_materials(part_b)],
+        };
+        let vary = surfaces.vary();
+        if !vary && surfaces.ignores([0; 2]) {
             return;
         }
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
@@ -359,38 +366,42 @@ impl NarrowPhase<'_> {
         }
         let Found { contact_constraints: out, needs_wake, cached, contacts: found } = results;
         let time = pair.contacts([a, b], self.horizon, (known, cached), found);
+        if vary {
+            found.retain(|contact| !surfaces.ignores(contact.shapes));
+        }
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be repeated with it awake
             needs_wake.extend((!found.is_empty()).then_some(sleeper.serial));
             return;
         }
-        let material = self.pair_materials.combine(self.settings, surface_a, surface_b);
-        let laws = ContactLaws::of_pair(&material, [(state_a, &surface_a.2), (state_b, &surface_b.2)]);
-        let of_surface = |state: &PartState, (.., material): Surface| state.pose.rotation * material.surface_velocity;
-        let surface_velocity = of_surface(state_a, surface_a) - of_surface(state_b, surface_b);
+        let mut shapes = [0; 2];
+        let mut surface = surfaces.laws(shapes);
         let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
-        let mut frame_of = |contact: &Contact| {
-            if contact.normal != frame.axes[0] {
-                frame = ContactLaws::frame(laws.as_deref(), contact.point, contact.normal);
+        out.extend(found.iter().map(|contact| {
+            let other = vary && contact.shapes != shapes;
+            if other {
+                (shapes, surface) = (contact.shapes, surfaces.laws(contact.shapes));
             }
-            ContactFrame { point: contact.point, ..frame }
-        };
-        out.extend(found.iter().map(|contact| ContactConstraint {
-            a,
-            b,
-            contact: *contact,
-            offset: Vec3::zeros(),
-            found_at: 0.0,
-            moved: Moved::default(),
-            frame: frame_of(contact),
-            friction: material.friction,
-            restitution: material.restitution,
-            surface_velocity,
-            laws: laws.clone(),
-            plane: None,
-            key: ContactKey { pair, feature: contact.feature },
+            if other || contact.normal != frame.axes[0] {
+                frame = ContactLaws::frame(surface.laws.as_deref(), contact.point, contact.normal);
+            }
+            ContactConstraint {
+                a,
+                b,
+                contact: *contact,
+                offset: Vec3::zeros(),
+                found_at: 0.0,
+                moved: Moved::default(),
+                frame: ContactFrame { point: contact.point, ..frame },
+                friction: surface.friction,
+                restitution: surface.restitution,
+                surface_velocity: surface.surface_velocity,
+                laws: surface.laws.clone(),
+                plane: None,
+                key: ContactKey { pair, feature: contact.feature },
+            }
         }));
         if time > 0.0 {
             out[first..].iter_mut().for_each(|constraint| {

@@ -88,6 +88,29 @@ impl ContactLaws {
                 * nalgebra::ComplexField::exp(-(speed / self.stribeck_speed).powi(2))
     }
 
+    /// Returns whether two contacts have the same laws.
+    pub fn are_same(a: &Option<Box<ContactLaws>>, b: &Option<Box<ContactLaws>>) -> bool {
+        let numbers = |laws: &ContactLaws| {
+            let ContactLaws {
+                rolling,
+                torsional,
+                static_friction,
+                stribeck_speed,
+                tangential_restitution,
+                adhesion,
+                ..
+            } = *laws;
+            (
+                [rolling, torsional, static_friction, stribeck_speed, tangential_restitution, adhesion],
+                laws.friction_scale,
+            )
+        };
+        match (a, b) {
+            (Some(a), Some(b)) => numbers(a) == numbers(b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
+
     /// Returns the adhesion at a contact, N.
     pub fn pull(laws: &Option<Box<ContactLaws>>) -> f64 {
         laws.as_ref().map_or(0.0, |laws| laws.pull)

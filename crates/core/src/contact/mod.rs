@@ -11,6 +11,7 @@ pub(crate) mod pair;
 pub(crate) mod pair_material;
 mod rim;
 mod separation;
+pub(crate) mod surfaces;
 pub(crate) mod time_of_impact;
 pub(crate) mod warm_starts;
 pub(crate) mod wrench;

@@ -51,10 +51,22 @@ pub trait Collidable {
     fn intersect(&self) -> Option<&dyn Intersect> {
         None
     }
+    /// Returns the direction, unit, in the frame of the part, of a part that collides on one side only: with what
+    /// comes against this direction, as an open terrain and a one-way platform. None by default.
+    fn one_way(&self, part: usize) -> Option<Vec3> {
+        let _ = part;
+        None
+    }
     /// Returns the surface constants of a part.
     fn material(&self, part: usize) -> Material {
         let _ = part;
         Material::default()
+    }
+    /// Returns the surface constants of single shapes of a part, for those that have their own: the
+    /// index of a compound's part with its constants, ascending. None by default.
+    fn shape_materials(&self, part: usize) -> &[(usize, Material)] {
+        let _ = part;
+        &[]
     }
     /// Returns the collision group of a part.
     fn collision_group(&self, part: usize) -> CollisionGroup {

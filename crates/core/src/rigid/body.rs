@@ -42,6 +42,9 @@ pub struct RigidBody {
     pub mask: u64,
     /// Whether it is a sensor: it has no contacts, and the world reports the bodies that overlap it.
     pub sensor: bool,
+    /// Direction, of any length above 0, in the body's frame, of a body that collides on one side only; `None` for all
+    /// others. See [`with_one_way`](Self::with_one_way).
+    pub one_way: Option<Vec3>,
     /// Pose of its frame at time 0.
     pub initial_pose: Pose,
     /// Velocity of the center of mass at time 0, m/s.
@@ -57,6 +60,8 @@ pub struct RigidBody {
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
     pub(super) intersect: Option<Arc<dyn Intersect>>,
+    /// Constants of parts of its compound, ascending.
+    pub(super) shape_materials: Vec<(usize, Material)>,
 }
 
 impl RigidBody {
@@ -108,6 +113,7 @@ impl RigidBody {
             group: CollisionGroup::default(),
             mask: u64::MAX,
             sensor: false,
+            one_way: None,
             initial_pose: Pose::identity(),
             initial_velocity: Vec3::zeros(),
             initial_angular_velocity: Vec3::zeros(),
@@ -115,6 +121,7 @@ impl RigidBody {
             cameras: Vec::new(),
             lights: Vec::new(),
             intersect: None,
+            shape_materials: Vec::new(),
         }
     }
 
@@ -258,6 +265,37 @@ impl RigidBody {
         self
     }
 
+    /// Sets the constants of the surface of one shape: the part of its compound with this index, in the order
+    /// of [`CompoundShape::parts`](tumble_collide::CompoundShape::parts). The others have those of the body.
+    #[must_use]
+    pub fn with_shape_material(mut self, shape: usize, material: Material) -> Self {
+        self.set_shape_material(shape, Some(material));
+        self
+    }
+
+    /// Sets the constants of one shape, or removes them. A body in a world is changed by
+    /// [`World::change_body`](crate::World::change_body).
+    pub fn set_shape_material(&mut self, shape: usize, material: Option<Material>) {
+        let found = self.shape_materials.binary_search_by_key(&shape, |(own, _)| *own);
+        match (found, material) {
+            (Ok(at), Some(material)) => self.shape_materials[at].1 = material,
+            (Ok(at), None) => drop(self.shape_materials.remove(at)),
+            (Err(at), Some(material)) => self.shape_materials.insert(at, (shape, material)),
+            (Err(_), None) => {}
+        }
+    }
+
+    /// Returns the constants of the surface of one shape: its own, or those of the body.
+    pub fn shape_material(&self, shape: usize) -> Material {
+        let found = self.shape_materials.binary_search_by_key(&shape, |(own, _)| *own);
+        found.map_or(self.material, |at| self.shape_materials[at].1)
+    }
+
+    /// Returns the shapes with constants of their own, ascending.
+    pub fn shape_materials(&self) -> &[(usize, Material)] {
+        &self.shape_materials
+    }
+
     /// Sets how its mesh or cylinder collides.
     #[must_use]
     pub fn with_contact_mode(mut self, mode: ContactMode) -> Self {
@@ -278,6 +316,17 @@ impl RigidBody {
     #[must_use]
     pub fn with_sensor(mut self, sensor: bool) -> Self {
         self.sensor = sensor;
+        self
+    }
+
+    /// Makes it collide on one side only, as an open terrain and a platform that is entered from below: with what
+    /// comes against `direction` (any length above 0, the body's frame), and not with what comes along it.
+    ///
+    /// A contact exists if the outward normal of the body has a component along the direction, and the other body is
+    /// not in it by more than a tenth of its bounding radius: what came from the other side, or has fallen deeper, passes.
+    #[must_use]
+    pub fn with_one_way(mut self, direction: Vec3) -> Self {
+        self.one_way = Some(direction);
         self
     }
 
@@ -361,10 +410,19 @@ impl RigidBody {
             if right && value.is_finite() { Ok(()) } else { Err(BodyError::Range { what, value, expected }) }
         };
         let unit = self.initial_pose.rotation.norm();
-        self.material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
+        let parts = if let Shape::Compound(compound) = &self.shape { compound.parts().len() } else { 0 };
+        for material in std::iter::once(&self.material).chain(self.shape_materials.iter().map(|(_, own)| own)) {
+            material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
+        }
+        if let Some((shape, _)) = self.shape_materials.last() {
+            let expected = "below the number of parts of the body's compound";
+            range("index of a shape with a material", *shape as f64, *shape < parts, expected)?;
+        }
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
         range("gravity scale", self.gravity_scale, true, "finite")?;
+        let length = self.one_way.map_or(1.0, |direction| direction.norm());
+        range("length of the one-way direction", length, length > 0.0, "above 0")?;
         self.offset.iter().try_for_each(|&x| range("center of mass", x, true, "finite"))?;
         range("norm of the orientation", unit, (unit - 1.0).abs() < 1e-6, "1")?;
         let numbers = [self.initial_pose.translation.vector, self.initial_velocity, self.initial_angular_velocity];

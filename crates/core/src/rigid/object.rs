@@ -428,6 +428,10 @@ impl Collidable for RigidBody {
         self.material
     }
 
+    fn shape_materials(&self, _part: usize) -> &[(usize, Material)] {
+        &self.shape_materials
+    }
+
     fn collision_group(&self, _part: usize) -> CollisionGroup {
         self.group
     }
@@ -446,6 +450,10 @@ impl Collidable for RigidBody {
 
     fn intersect(&self) -> Option<&dyn Intersect> {
         self.intersect.as_deref()
+    }
+
+    fn one_way(&self, _part: usize) -> Option<Vec3> {
+        self.one_way?.try_normalize(0.0)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Contact patches: rolling and torsional friction, and friction that depends on the sliding speed.
 //!
-//! Contacts of a pair with one normal are a *patch*. The patch has angular rows, which exist during one
+//! Contacts of a pair with one normal and the same constants are a *patch*. The patch has angular rows, which exist during one
 //! solve: one along the normal, two along the tangents. Their bounds are multiples of the normal forces of
 //! the solution, so the rows are solved again until they no longer change. How friction is divided, between
 //! sliding and spinning and among the directions of rolling, is found from the velocities with the
@@ -144,8 +144,12 @@ fn lay_patches(
 ) -> Result<Vec<Patch>, StepError> {
     let mut patches: Vec<Patch> = Vec::new();
     let mut first = 0;
-    let same =
-        |a: &ContactConstraint, b: &ContactConstraint| a.key.pair == b.key.pair && a.frame.axes[0] == b.frame.axes[0];
+    let same = |a: &ContactConstraint, b: &ContactConstraint| {
+        a.key.pair == b.key.pair
+            && a.frame.axes[0] == b.frame.axes[0]
+            && a.friction == b.friction
+            && ContactLaws::are_same(&a.laws, &b.laws)
+    };
     for contacts in work.contact_constraints.chunk_by(same) {
         let range = first..first + contacts.len();
         first = range.end;

@@ -131,10 +131,14 @@ pub struct ContactPoint {
     pub a: ObjectId,
     /// Part of `a`.
     pub part_a: usize,
+    /// Shape of that part that touches: the index of a compound's part; 0 for all other shapes.
+    pub shape_a: usize,
     /// The object that the normal points from.
     pub b: ObjectId,
     /// Part of `b`.
     pub part_b: usize,
+    /// Shape of that part that touches.
+    pub shape_b: usize,
     /// Contact point, meters.
     pub point: Vec3,
     /// Unit normal from `b` to `a`.
@@ -498,8 +502,10 @@ impl Core {
             self.contacts.push(ContactPoint {
                 a: a.id,
                 part_a: a.part as usize,
+                shape_a: constraint.contact.shapes[0] as usize,
                 b: b.id,
                 part_b: b.part as usize,
+                shape_b: constraint.contact.shapes[1] as usize,
                 velocity,
                 impulse,
                 force,

@@ -104,8 +104,20 @@ fn a_contact_within_the_margin_touches_only_with_an_impulse() {
     let (a, b) = (world.add(ball("a", 1.0)).unwrap(), world.add(ball("b", 2.0)).unwrap());
     let zero = Vec3::zeros();
     let (point, normal, velocity) = (zero, Vec3::z(), zero);
-    let apart =
-        ContactPoint { a, part_a: 0, b, part_b: 0, point, normal, depth: -1e-6, velocity, impulse: zero, force: zero };
+    let apart = ContactPoint {
+        a,
+        part_a: 0,
+        shape_a: 0,
+        b,
+        part_b: 0,
+        shape_b: 0,
+        point,
+        normal,
+        depth: -1e-6,
+        velocity,
+        impulse: zero,
+        force: zero,
+    };
     assert!(!apart.is_touching());
     assert!(ContactPoint { impulse: Vec3::z(), ..apart }.is_touching());
     assert!(ContactPoint { depth: 0.0, ..apart }.is_touching());
@@ -207,8 +219,10 @@ fn a_replica_shows_what_it_is_given() {
     let contact = |b| ContactPoint {
         a: id,
         part_a: 0,
+        shape_a: 0,
         b,
         part_b: 0,
+        shape_b: 0,
         point: up,
         normal: up,
         depth: 0.1,

@@ -81,7 +81,7 @@ fn queries_see_the_parts() {
         world.cast_ray(&Ray { origin: Vec3::new(x, 0.0, 3.0), direction: -Vec3::z(), max_distance: 10.0 }, &filter)
     };
     let hit = down(0.3).unwrap();
-    assert!((hit.distance - 1.9).abs() < 1e-9 && hit.id == id && hit.face == 1);
+    assert!((hit.distance - 1.9).abs() < 1e-9 && hit.id == id && (hit.shape, hit.face) == (1, 0));
     assert!(down(0.0).is_none());
     let cast =
         world.cast_shape(&Shape::sphere(0.25).unwrap(), &Pose::translation(0.0, 0.0, 3.0), &-Vec3::z(), 10.0, &filter);

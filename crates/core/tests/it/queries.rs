@@ -74,7 +74,7 @@ fn rays_hit_what_the_nearest_of_all_bodies_is() {
             let found = shape.cast_ray(pose, &ray.origin, &ray.direction, ray.max_distance);
             if let Some(found) = found.filter(|f| wanted.is_none_or(|w| f.distance < w.distance)) {
                 let (distance, normal, face) = (found.distance, found.normal, found.face);
-                wanted = Some(RayCastHit { id: *id, part: 0, distance, normal, face });
+                wanted = Some(RayCastHit { id: *id, part: 0, shape: 0, distance, normal, face });
             }
         }
         // the direction is normalized twice in one of them

@@ -56,7 +56,20 @@ pub(crate) fn get_contacts(
         let (point, normal, depth, force) =
             (vector(&mut rest)?, vector(&mut rest)?, number(&mut rest)?, vector(&mut rest)?);
         let (velocity, impulse) = (Vec3::zeros(), Vec3::zeros());
-        contacts.push(ContactPoint { a, part_a, b, part_b, point, normal, depth, velocity, impulse, force });
+        contacts.push(ContactPoint {
+            a,
+            part_a,
+            shape_a: 0,
+            b,
+            part_b,
+            shape_b: 0,
+            point,
+            normal,
+            depth,
+            velocity,
+            impulse,
+            force,
+        });
     }
     rest.end()?;
     Ok(contacts)

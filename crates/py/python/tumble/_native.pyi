@@ -407,6 +407,31 @@ class RigidBody:
         """Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts."""
     @adhesion.setter
     def adhesion(self, value: float) -> None: ...
+    def shape_material(self, shape: int) -> dict[str, Any]:
+        """Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
+
+        shape: index of the part of a ``Compound``, as ``shapes`` of contacts has it.
+        """
+    def set_shape_material(
+        self,
+        shape: int,
+        *,
+        friction: float | None = None,
+        restitution: float | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
+    ) -> None:
+        """Sets surface constants of one shape, the part of a ``Compound``, by the names of the properties of the body.
+
+        shape: index of the part. Constants that are not given stay as they are, for a shape without its own those of
+        the body at this time. Without any, the shape has those of the body again.
+        """
     @property
     def color(self) -> _Floats:
         """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
@@ -417,6 +442,14 @@ class RigidBody:
         """Factor of the world's gravity, 1 by default."""
     @gravity_scale.setter
     def gravity_scale(self, value: float) -> None: ...
+    @property
+    def one_way(self) -> _Floats | None:
+        """Direction, shape (3,), frame of the shape, any length above 0, of a body that collides on one side only, such as
+        open terrain or a one-way platform: with what comes against it. What comes from the other side passes. None for
+        a body that collides on all sides.
+        """
+    @one_way.setter
+    def one_way(self, value: ArrayLike | None) -> None: ...
     @property
     def locked(self) -> tuple[LockedAxis, ...]:
         """Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
@@ -1295,8 +1328,34 @@ class Articulation:
     @property
     def limits(self) -> _Floats:
         """Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
-        without a limit.
+        without a limit. Settable for a body in a world.
         """
+    @limits.setter
+    def limits(self, value: ArrayLike) -> None: ...
+    @property
+    def joint_damping(self) -> _Floats:
+        """Viscous damping of each degree of freedom, shape (dof,), N·m·s/rad or N·s/m. Settable for a body in a world: a
+        number for all, or shape (dof,).
+        """
+    @joint_damping.setter
+    def joint_damping(self, value: ArrayLike) -> None: ...
+    @property
+    def joint_friction(self) -> _Floats:
+        """Dry friction of each degree of freedom, shape (dof,), N·m or N. Settable like ``joint_damping``."""
+    @joint_friction.setter
+    def joint_friction(self, value: ArrayLike) -> None: ...
+    @property
+    def stiffness(self) -> _Floats:
+        """Stiffness of the spring of each degree of freedom, shape (dof,), N·m/rad or N/m; 0 without one. Settable like
+        ``joint_damping``; that of a drive is an argument of ``set_drive``.
+        """
+    @stiffness.setter
+    def stiffness(self, value: ArrayLike) -> None: ...
+    @property
+    def rest(self) -> _Floats:
+        """Rest position of the spring of each degree of freedom, shape (dof,), rad or m. Settable like ``joint_damping``."""
+    @rest.setter
+    def rest(self, value: ArrayLike) -> None: ...
     @property
     def max_velocity(self) -> _Floats:
         """Largest speed of each degree of freedom, shape (dof,), rad/s or m/s; infinite for none. Settable for a
@@ -2053,7 +2112,8 @@ class World:
         """The contacts of the last step: a structured array with one row each.
 
         Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
-        for articulated bodies the indices of the links in their ``link_names``; ``point`` (3,), m;
+        for articulated bodies the indices of the links in their ``link_names``; ``shapes`` (2,), as
+        ``shape`` in ``cast_rays``; ``point`` (3,), m;
         ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
         apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
         m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
@@ -2130,9 +2190,10 @@ class World:
         serves all. max_distance: length of the rays, m, a number or shape (n,); None: unlimited.
 
         Fields: ``distance``, m, infinite for a miss; ``body``, its number in ``world.bodies``, -1 for
-        a miss; ``part``, for an articulation the index of the link in its ``link_names``; ``face``,
+        a miss; ``part``, for an articulation the index of the link in its ``link_names``; ``shape``, the
+        index of a compound's part, and on a link that among its shapes that collide, in their order; ``face``,
         the index of a mesh's triangle, 0 to 5 for -x, +x, -y, +y, -z and +z of a box, 0 to 2 for side,
-        -z end and +z end of a cylinder, else 0; ``normal`` (3,), unit, outward, world axes.
+        -z end and +z end of a cylinder, of a compound the face of that part, else 0; ``normal`` (3,), unit, outward, world axes.
 
         A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
         only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
@@ -2156,7 +2217,7 @@ class World:
 
         direction: shape (3,), of any length above 0, world axes. max_distance: how far it moves, m,
         finite. position, orientation: where it starts. Fields: ``distance``, m, 0 if it overlaps at
-        the start; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), m;
+        the start; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), m;
         ``normal`` (3,), unit, from the body towards the shape.
         """
     def overlaps(
@@ -2169,8 +2230,8 @@ class World:
         mask: int | Sequence[int] | None = None,
         ignore: _Body | Sequence[_Body] | None = None,
     ) -> NDArray[np.void]:
-        """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``
-        and ``part``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
+        """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``,
+        ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
 
         position, orientation: as in ``add_rigid``. group, mask, ignore: as in ``cast_rays``.
         """
@@ -2189,8 +2250,8 @@ class World:
         if ``b`` is None. None if a body has no shape or is disabled.
 
         a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
-        negative depth if they overlap; ``bodies`` (2,) and ``parts`` (2,) as in ``contacts``, -1 for a
-        shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
+        negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
+        for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
         the first. group, mask, ignore: of a shape, as in ``cast_rays``.
         """
     def contains(
@@ -2208,7 +2269,7 @@ class World:
 
         Fields: ``depth``, m, below the surface of the body in which the point is deepest, and for a
         point outside of all bodies minus the distance from the nearest one, minus infinity if there
-        is none; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
+        is none; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
         point of the surface, m; ``normal`` (3,), unit, outward.
         """
     def energy(self) -> Energy:
@@ -2331,6 +2392,7 @@ class World:
         locked: Sequence[LockedAxis] | None = None,
         non_spinning: bool = False,
         intersect: Intersect | None = None,
+        one_way: ArrayLike | None = None,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -2347,7 +2409,8 @@ class World:
         mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
         frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
         rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
-        ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface.
+        ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface. one_way: as
+        the property.
         """
     def add_static(
         self,
@@ -2364,9 +2427,10 @@ class World:
         mask: int | Sequence[int] | None = None,
         sensor: bool = False,
         intersect: Intersect | None = None,
+        one_way: ArrayLike | None = None,
     ) -> RigidBody:
         """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-        group, mask, sensor, intersect: as in ``add_rigid``.
+        group, mask, sensor, intersect, one_way: as in ``add_rigid``.
         """
     def add_articulation(
         self, articulation: Articulation | ArticulationBuilder | _Path, base: ArrayLike | None = None, *, name: str | None = None

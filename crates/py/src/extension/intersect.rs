@@ -101,5 +101,14 @@ fn contact(touch: &Bound<'_, PyAny>, number: usize, name: &str) -> Result<Contac
         (true, false) => NormalFrom::FaceOfB,
         (true, true) => NormalFrom::CorePoints,
     };
-    Ok(Contact { point: vector_at(0, "point")?, normal, gap: number_at(2)?, feature, core_a, core_b, normal_from })
+    Ok(Contact {
+        point: vector_at(0, "point")?,
+        normal,
+        gap: number_at(2)?,
+        feature,
+        core_a,
+        core_b,
+        normal_from,
+        shapes: [0; 2],
+    })
 }

@@ -273,12 +273,17 @@ impl Articulation {
     }
 
     /// Lower and upper position limit of each degree of freedom, shape (dof, 2), rad or m; infinite
-    /// without a limit.
+    /// without a limit. Settable for a body in a world.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {
         let dofs = self.spot.dofs()?;
         let flat = dofs.iter().flat_map(|f| f.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect();
         Ok(PyArray1::from_vec(py, flat).reshape([dofs.len(), 2])?)
+    }
+
+    #[setter]
+    fn set_limits(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_limits(py, value)
     }
 
     /// Largest speed of each degree of freedom, shape (dof,), rad/s or m/s; infinite for none. Settable for a

@@ -30,12 +30,12 @@ pub struct RigidBody {
 handle!(RigidBody, "RigidBody", |_| Some(String::new()));
 
 impl RigidBody {
-    fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
+    pub(super) fn constant<T>(&self, get: impl FnOnce(&Rigid) -> T) -> Result<T> {
         self.place.read(|inner| inner.world.get::<Rigid>(self.place.id).map(get))
     }
 
     /// Changes a constant. An invalid value changes nothing.
-    fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
+    pub(super) fn change(&self, py: Python<'_>, set: impl FnOnce(&mut Rigid)) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.change_body(self.place.id, set)?))
     }
 
@@ -424,6 +424,20 @@ impl RigidBody {
     #[setter]
     fn set_gravity_scale(&self, py: Python<'_>, value: f64) -> Result<()> {
         self.change(py, |body| body.gravity_scale = value)
+    }
+
+    /// Direction, shape (3,), frame of the shape, any length above 0, of a body that collides on one side only, such as
+    /// open terrain or a one-way platform: with what comes against it. What comes from the other side passes. None for
+    /// a body that collides on all sides.
+    #[getter]
+    fn one_way<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyArray1<f64>>>> {
+        Ok(self.constant(|body| body.one_way)?.map(|direction| array(py, direction.as_slice())))
+    }
+
+    #[setter]
+    fn set_one_way(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let direction = value.map(|value| vec3(value, "one_way")).transpose()?;
+        self.change(py, |body| body.one_way = direction)
     }
 
     /// Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move

@@ -13,12 +13,14 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
 use std::sync::Arc;
-use tumble::dynamics::{ArticulatedBody, Event, EventKind, ObjectId};
+use tumble::collide::Shape as Solid;
+use tumble::dynamics::{ArticulatedBody, Collidable, Event, EventKind, ObjectId};
 
 /// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
-const FIELDS: [(&str, &str, usize); 8] = [
+const FIELDS: [(&str, &str, usize); 9] = [
     ("bodies", "<i8", 2),
     ("parts", "<i8", 2),
+    ("shapes", "<i8", 2),
     ("point", "<f8", 3),
     ("normal", "<f8", 3),
     ("depth", "<f8", 1),
@@ -32,10 +34,13 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     let ids = body_ids(&inner.world);
     let number = |id: ObjectId| ids.iter().position(|&other| other == id).map_or(-1, |k| k as i64);
     let contacts = inner.world.contacts();
-    let mut out = Vec::with_capacity(contacts.len() * 20 * 8);
+    let mut out = Vec::with_capacity(contacts.len() * 22 * 8);
     for c in contacts {
-        let whole = [number(c.a), number(c.b), link(inner, c.a, c.part_a), link(inner, c.b, c.part_b)];
-        whole.iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
+        let [a, b] = [(c.a, c.part_a, c.shape_a), (c.b, c.part_b, c.shape_b)];
+        let each =
+            |of: fn(&Inner, ObjectId, usize, usize) -> i64| [a, b].map(|(id, part, shape)| of(inner, id, part, shape));
+        let whole = [[number(a.0), number(b.0)], each(|inner, id, part, _| link(inner, id, part)), each(shape_number)];
+        whole.as_flattened().iter().for_each(|k| out.extend_from_slice(&k.to_le_bytes()));
         let (first, last) =
             (c.point.iter().chain(c.normal.iter()), c.velocity.iter().chain(c.impulse.iter()).chain(c.force.iter()));
         let real = first.copied().chain([c.depth]).chain(last.copied());
@@ -52,6 +57,17 @@ pub fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
     let frames = body.model().frames();
     // Shapes on the base count as the first link, to which all others are attached.
     name.and_then(|name| frames.iter().position(|frame| frame.name == *name)).unwrap_or(0) as i64
+}
+
+/// Returns the number of a shape: the index of a compound's part; on a link, its index among the
+/// shapes of the link that collide, where the parts of a compound count one by one.
+pub fn shape_number(inner: &Inner, id: ObjectId, part: usize, shape: usize) -> i64 {
+    let before = inner.world.get::<ArticulatedBody>(id).map_or(0, |body| {
+        let count = |solid: &Solid| if let Solid::Compound(compound) = solid { compound.parts().len() } else { 1 };
+        let earlier = body.colliders_of(body.link_of(part)).filter(|other| *other < part);
+        earlier.filter_map(|other| Collidable::shape(body, other)).map(count).sum()
+    });
+    (before + shape) as i64
 }
 
 /// Returns the array of such bytes.

@@ -5,7 +5,7 @@ use crate::errors::{Error, Result};
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
 use crate::world::add::own_place;
-use crate::world::contacts::link;
+use crate::world::contacts::{link, shape_number};
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use nalgebra::Translation3;
@@ -22,6 +22,7 @@ type Field = (&'static str, bool, &'static [usize]);
 
 const BODY: Field = ("body", true, &[]);
 const PART: Field = ("part", true, &[]);
+const SHAPE: Field = ("shape", true, &[]);
 const NORMAL: Field = ("normal", false, &[3]);
 const POINT: Field = ("point", false, &[3]);
 const DISTANCE: Field = ("distance", false, &[]);
@@ -74,9 +75,9 @@ impl Numbering {
         Numbering((0..).zip(body_ids(&inner.world)).map(|(number, id)| (id, number)).collect())
     }
 
-    /// Returns the number of a body, and the index of its link.
-    pub fn sides(&self, inner: &Inner, id: ObjectId, part: usize) -> [i64; 2] {
-        [self.0.get(&id).copied().unwrap_or(-1), link(inner, id, part)]
+    /// Returns the number of a body, the index of its link, and the number of its shape.
+    pub fn sides(&self, inner: &Inner, id: ObjectId, part: usize, shape: usize) -> [i64; 3] {
+        [self.0.get(&id).copied().unwrap_or(-1), link(inner, id, part), shape_number(inner, id, part, shape)]
     }
 }
 
@@ -184,22 +185,22 @@ pub fn cast_rays<'py>(
         })
         .collect();
     let filter = selection.filter(shared)?;
-    const FIELDS: &[Field] = &[DISTANCE, BODY, PART, ("face", true, &[]), NORMAL];
+    const FIELDS: &[Field] = &[DISTANCE, BODY, PART, SHAPE, ("face", true, &[]), NORMAL];
     let rows = py.detach(|| {
         shared.read(|inner| {
             let (hits, numbering) = (inner.world.cast_rays(&rays, &filter), Numbering::of(inner));
-            let mut rows = Rows { fields: FIELDS, bytes: Vec::with_capacity(hits.len() * 7 * 8) };
+            let mut rows = Rows { fields: FIELDS, bytes: Vec::with_capacity(hits.len() * 8 * 8) };
             for hit in hits {
                 match hit {
                     Some(hit) => {
-                        let [body, part] = numbering.sides(inner, hit.id, hit.part);
                         rows.real([&hit.distance]);
-                        rows.whole(&[body, part, i64::from(hit.face)]);
+                        rows.whole(&numbering.sides(inner, hit.id, hit.part, hit.shape));
+                        rows.whole(&[i64::from(hit.face)]);
                         rows.real(hit.normal.iter());
                     }
                     None => {
                         rows.real([&f64::INFINITY]);
-                        rows.whole(&[-1, -1, -1]);
+                        rows.whole(&[-1; 4]);
                         rows.real(Vec3::zeros().iter());
                     }
                 }
@@ -220,9 +221,9 @@ pub fn overlaps<'py>(
 ) -> Result<Bound<'py, PyAny>> {
     let (at, filter) = (placed(shape, pose(position, orientation)?), selection.filter(shared)?);
     let rows = shared.read(|inner| {
-        let (mut rows, numbering) = (Rows::new(&[BODY, PART, DEPTH]), Numbering::of(inner));
+        let (mut rows, numbering) = (Rows::new(&[BODY, PART, SHAPE, DEPTH]), Numbering::of(inner));
         for found in inner.world.overlaps(&shape.solid, &at, &filter) {
-            rows.whole(&numbering.sides(inner, found.id, found.part));
+            rows.whole(&numbering.sides(inner, found.id, found.part, found.shape));
             rows.real([&found.depth]);
         }
         Ok(rows)
@@ -244,7 +245,7 @@ pub fn contains<'py>(
             .world
             .contains(&point, &filter)
             .into_iter()
-            .map(|(id, part)| numbering.sides(inner, id, part)[0])
+            .map(|(id, part)| numbering.sides(inner, id, part, 0)[0])
             .collect::<Vec<i64>>())
     })?;
     bodies.dedup();
@@ -261,17 +262,17 @@ pub fn point_depth<'py>(
     let ((points, many), filter) = (vectors(points, "points")?, selection.filter(shared)?);
     let rows = py.detach(|| {
         shared.read(|inner| {
-            let (mut rows, numbering) = (Rows::new(&[DEPTH, BODY, PART, POINT, NORMAL]), Numbering::of(inner));
+            let (mut rows, numbering) = (Rows::new(&[DEPTH, BODY, PART, SHAPE, POINT, NORMAL]), Numbering::of(inner));
             for point in &points {
                 match inner.world.point_depth(point, &filter) {
                     Some(found) => {
                         rows.real([&found.depth]);
-                        rows.whole(&numbering.sides(inner, found.id, found.part));
+                        rows.whole(&numbering.sides(inner, found.id, found.part, found.shape));
                         rows.real(found.point.iter().chain(found.normal.iter()));
                     }
                     None => {
                         rows.real([&f64::NEG_INFINITY]);
-                        rows.whole(&[-1, -1]);
+                        rows.whole(&[-1; 3]);
                         rows.real([&0.0; 6]);
                     }
                 }
@@ -292,18 +293,24 @@ pub fn closest_points<'py>(
     (position, orientation): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
     selection: &Selection<'_, '_>,
 ) -> Result<Option<Bound<'py, PyAny>>> {
-    const FIELDS: &[Field] =
-        &[DISTANCE, ("bodies", true, &[2]), ("parts", true, &[2]), ("points", false, &[2, 3]), NORMAL];
+    const PAIR: &[usize] = &[2];
+    const FIELDS: &[Field] = &[
+        DISTANCE,
+        ("bodies", true, PAIR),
+        ("parts", true, PAIR),
+        ("shapes", true, PAIR),
+        ("points", false, &[2, 3]),
+        NORMAL,
+    ];
     let row = |inner: &Inner, found: Option<BodyDistance>| {
         let mut rows = Rows::new(FIELDS);
         if let Some(found) = found {
             let numbering = Numbering::of(inner);
-            let sides = [found.a.map_or([-1, -1], |(id, part)| numbering.sides(inner, id, part)), {
-                let (id, part) = found.b;
-                numbering.sides(inner, id, part)
-            }];
+            let [shape_a, shape_b] = found.shapes;
+            let side = |(id, part): (ObjectId, usize), shape| numbering.sides(inner, id, part, shape);
+            let (a, b) = (found.a.map_or([-1; 3], |a| side(a, shape_a)), side(found.b, shape_b));
             rows.real([&found.distance]);
-            rows.whole(&[sides[0][0], sides[1][0], sides[0][1], sides[1][1]]);
+            (0..3).for_each(|k| rows.whole(&[a[k], b[k]]));
             rows.real(found.points.iter().flat_map(|p| p.iter()).chain(found.normal.iter()));
         }
         Ok(rows)
@@ -350,10 +357,10 @@ pub fn cast_shape<'py>(
     let max_distance = length(max_distance, "max_distance")?;
     let (at, filter) = (placed(shape, pose(position, orientation)?), selection.filter(shared)?);
     let rows = shared.read(|inner| {
-        let mut rows = Rows::new(&[DISTANCE, BODY, PART, POINT, NORMAL]);
+        let mut rows = Rows::new(&[DISTANCE, BODY, PART, SHAPE, POINT, NORMAL]);
         if let Some(hit) = inner.world.cast_shape(&shape.solid, &at, &direction, max_distance, &filter) {
             rows.real([&hit.distance]);
-            rows.whole(&Numbering::of(inner).sides(inner, hit.id, hit.part));
+            rows.whole(&Numbering::of(inner).sides(inner, hit.id, hit.part, hit.shape));
             rows.real(hit.point.iter().chain(hit.normal.iter()));
         }
         Ok(rows)

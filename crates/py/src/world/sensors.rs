@@ -188,7 +188,10 @@ pub fn value<'py>(py: Python<'py>, place: &Place) -> Result<Bound<'py, PyAny>> {
 fn parts_in_image(inner: &Inner, id: ObjectId) -> Option<SensorImage<[i32; 2]>> {
     let SensorImage { width, height, pixels } = inner.world.segmentation_image(id)?;
     let numbers = Numbering::of(inner);
-    let of = |(id, part)| numbers.sides(inner, id, part).map(|number| i32::try_from(number).unwrap_or(-1));
+    let of = |(id, part)| {
+        let [body, part, _] = numbers.sides(inner, id, part, 0);
+        [body, part].map(|number| i32::try_from(number).unwrap_or(-1))
+    };
     let pixels = pixels.into_iter().map(|part| part.map_or([-1; 2], of)).collect();
     Some(SensorImage { width, height, pixels })
 }

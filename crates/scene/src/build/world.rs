@@ -228,6 +228,10 @@ impl SceneFile {
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
         let material = Material { id: material_id(spec.material), ..spec.contact };
+        let of_parts = spec.shape.surfaces().into_iter().enumerate().filter_map(|(n, own)| Some((n, own?)));
+        let body = of_parts.fold(body, |body, (n, own)| {
+            body.with_shape_material(n, Material { id: material_id(own.material), ..own.contact })
+        });
         let mut body = body
             .with_name(&spec.name)
             .with_pose(pose)
@@ -246,6 +250,7 @@ impl SceneFile {
         body.angular_damping = spec.angular_damping_per_s;
         (body.gravity_scale, body.locked) = (spec.gravity_scale, spec.locked);
         (body.group, body.mask, body.sensor) = (spec.group, spec.mask, spec.sensor);
+        body.one_way = spec.one_way.map(Vec3::from);
         Ok(body)
     }
 

@@ -155,6 +155,7 @@ impl Assembly<'_, '_> {
             group: surface.group,
             mask: surface.mask,
             sensor: false,
+            one_way: None,
             enabled: true,
             visible: true,
             sound: None,
@@ -283,6 +284,6 @@ fn joined(mut parts: Vec<(Pose, ShapeSpec)>) -> ShapeSpec {
     if parts.len() == 1 && parts[0].0 == Pose::identity() {
         return parts.remove(0).1;
     }
-    let part = |(pose, shape)| CompoundPartSpec { shape, pose, density_kg_per_m3: None };
+    let part = |(pose, shape)| CompoundPartSpec { shape, pose, density_kg_per_m3: None, surface: None };
     ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }
 }

@@ -13,7 +13,7 @@ use crate::parse::link::read_inertia;
 use crate::parse::material::{MaterialSpec, read_contact, read_sound};
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
-use crate::parse::shape::ShapeSpec;
+use crate::parse::shape::{PartSurface, ShapeContext, ShapeSpec};
 use crate::parse::world::CONTACTS;
 
 const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
@@ -78,6 +78,8 @@ pub struct BodySpec {
     /// Is a sensor: it has no contacts, and the world reports the bodies that overlap it. Default
     /// false.
     pub sensor: bool,
+    /// Direction, in the shape's frame, of a body that collides on one side only. Default none.
+    pub one_way: Option<[f64; 3]>,
     /// Takes part in the simulation. Default true.
     pub enabled: bool,
     /// Is drawn. Default true.
@@ -104,11 +106,13 @@ impl BodySpec {
     pub(crate) fn read(f: &mut Fields<'_>, library: &Library<'_>) -> Option<BodySpec> {
         let name = read_name(f);
         let mode = read_mode(f);
-        let shape = ShapeSpec::read(f, &library.meshes);
-        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let material = read_material(f, library);
         let base = material.map(|index| &library.materials[index]);
-        let of_material = base.map_or_else(Material::default, |m| m.contact);
+        let contact = read_contact(f, &base.map_or_else(Material::default, |m| m.contact));
+        let surface = PartSurface { material, contact };
+        let context = ShapeContext { meshes: &library.meshes, surface: Some((library, surface)) };
+        let shape = ShapeSpec::read(f, context);
+        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -121,7 +125,7 @@ impl BodySpec {
             velocity_m_per_s: linear,
             angular_velocity_rad_per_s: angular,
             material,
-            contact: read_contact(f, &of_material),
+            contact,
             contacts: f.choice_or("contacts", CONTACTS, library.contacts),
             center_m: f.optional_vector("center_m", Bound::ANY),
             inertia_kg_m2: read_inertia(f),
@@ -133,6 +137,7 @@ impl BodySpec {
             group: read_group(f, CollisionGroup::default()),
             mask: read_mask(f, u64::MAX),
             sensor: f.flag_or("sensor", false),
+            one_way: read_direction(f, "one_way"),
             enabled: f.flag_or("enabled", true),
             visible: f.flag_or("visible", true),
             sound: read_sound(f),
@@ -178,6 +183,17 @@ pub(crate) fn read_mask(f: &mut Fields<'_>, default: u64) -> u64 {
         return u64::MAX;
     };
     groups.iter().fold(0, |mask, group| mask | 1 << f.as_integer("mask", group, GROUPS))
+}
+
+/// Reads a direction of any length above 0.
+fn read_direction(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 3]> {
+    let direction = f.optional_vector(key, Bound::ANY)?;
+    if direction == [0.0; 3]
+        && let Some(value) = f.value(key)
+    {
+        f.wrong(key, value, "a direction, such as [0, 0, 1]");
+    }
+    Some(direction)
 }
 
 /// Reads the names of locked axes.

@@ -17,7 +17,7 @@ use crate::parse::material::read_contact;
 use crate::parse::mesh::read_path;
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
-use crate::parse::shape::ShapeSpec;
+use crate::parse::shape::{ShapeContext, ShapeSpec};
 use crate::parse::world::CONTACTS;
 
 /// Largest number of shapes of one link.
@@ -278,7 +278,7 @@ impl LinkShape {
         if f.value("type").and_then(|value| value.get_ref().as_str()) == Some("visual_mesh") {
             return LinkShape::read_visual(f, from);
         }
-        let Some(shape) = ShapeSpec::read_part(&mut f, &from.library.meshes) else {
+        let Some(shape) = ShapeSpec::read_part(&mut f, ShapeContext::of_meshes(&from.library.meshes)) else {
             f.give_up();
             return None;
         };

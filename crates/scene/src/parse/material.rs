@@ -46,6 +46,11 @@ pub(crate) fn read_contact(f: &mut Fields<'_>, base: &Material) -> Material {
     }
 }
 
+/// Returns whether the table has a contact constant.
+pub(crate) fn has_contact(f: &mut Fields<'_>) -> bool {
+    CONTACT_KEYS.iter().any(|(key, _)| f.value(key).is_some())
+}
+
 /// Copies the contact constants that the table gives, which have been read to `new`.
 pub(crate) fn overlay_contact(f: &mut Fields<'_>, own: &mut Material, new: &Material) {
     for (key, pass) in CONTACT_KEYS {

@@ -10,7 +10,7 @@ use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec, Parts};
 use crate::parse::rotation;
-use crate::parse::shape::ShapeSpec;
+use crate::parse::shape::{ShapeContext, ShapeSpec};
 
 /// The thing that a sensor is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,7 +136,7 @@ fn read_volume(f: &mut Fields<'_>) -> Option<ShapeSpec> {
     let value = f.value("volume")?;
     let example = "{ type = \"sphere\", radius_m = 0.05 }";
     let mut own = Fields::of(f.log, value, format!("the volume of {}", f.what), example)?;
-    let shape = ShapeSpec::read_part(&mut own, &BTreeMap::new());
+    let shape = ShapeSpec::read_part(&mut own, ShapeContext::of_meshes(&BTreeMap::new()));
     own.finish();
     shape
 }

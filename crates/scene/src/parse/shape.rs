@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use tumble_core::Material;
 use tumble_core::collide::{Pose, Shape, ShapeError};
 
+use crate::parse::body::{Library, read_material};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
+use crate::parse::material::{has_contact, read_contact};
 use crate::parse::rotation;
 
 /// Maximum number of parts of a compound.
@@ -89,6 +92,32 @@ pub struct CompoundPartSpec {
     pub pose: Pose,
     /// Density, kg/m³; all parts have one or none has.
     pub density_kg_per_m3: Option<f64>,
+    /// Surface constants of its own. Default: those of the body.
+    pub surface: Option<PartSurface>,
+}
+
+/// Surface constants of a part of a compound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartSurface {
+    /// Index into [`SceneFile::materials`](crate::SceneFile::materials): the part's own, else that of its body.
+    pub material: Option<usize>,
+    /// Contact constants: the part's own, else those of the material that it names, else its body's.
+    pub contact: Material,
+}
+
+/// Meshes and materials that a shape refers to.
+#[derive(Clone, Copy)]
+pub(crate) struct ShapeContext<'a> {
+    pub meshes: &'a BTreeMap<&'a str, Option<usize>>,
+    /// Materials of the scene, and the surface of the body; `None` where parts have no surfaces of their own.
+    pub surface: Option<(&'a Library<'a>, PartSurface)>,
+}
+
+impl<'a> ShapeContext<'a> {
+    /// Returns the context of a shape whose parts have no surfaces of their own.
+    pub fn of_meshes(meshes: &'a BTreeMap<&'a str, Option<usize>>) -> ShapeContext<'a> {
+        ShapeContext { meshes, surface: None }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -119,7 +148,7 @@ const KINDS: Names<Kind> = &[
 
 impl ShapeSpec {
     /// Reads the key `shape` of a body.
-    pub(crate) fn read(body: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+    pub(crate) fn read(body: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeSpec> {
         let example = "{ type = \"sphere\", radius_m = 0.5 }";
         let value = body.required("shape", &format!("a shape, such as {example}"))?;
         let mut f = Fields::of(body.log, value, format!("the shape of {}", body.what), example)?;
@@ -127,18 +156,18 @@ impl ShapeSpec {
             f.give_up();
             return None;
         };
-        let shape = ShapeSpec::of_kind(&mut f, kind, meshes);
+        let shape = ShapeSpec::of_kind(&mut f, kind, context);
         f.finish();
         shape
     }
 
     /// Reads a shape from a table that has other keys as well. Does not finish the table.
-    pub(crate) fn read_part(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+    pub(crate) fn read_part(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeSpec> {
         let kind = f.choice("type", KINDS)?;
-        ShapeSpec::of_kind(f, kind, meshes)
+        ShapeSpec::of_kind(f, kind, context)
     }
 
-    fn of_kind(f: &mut Fields<'_>, kind: Kind, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+    fn of_kind(f: &mut Fields<'_>, kind: Kind, context: ShapeContext<'_>) -> Option<ShapeSpec> {
         match kind {
             Kind::Sphere => Some(ShapeSpec::Sphere { radius_m: f.number("radius_m", Bound::POSITIVE) }),
             Kind::Box => {
@@ -174,8 +203,8 @@ impl ShapeSpec {
                 })
             }
             Kind::HalfSpace => Some(ShapeSpec::HalfSpace),
-            Kind::Mesh => read_mesh(f, meshes),
-            Kind::Compound => read_compound(f, meshes),
+            Kind::Mesh => read_mesh(f, context.meshes),
+            Kind::Compound => read_compound(f, context),
         }
     }
 
@@ -183,6 +212,17 @@ impl ShapeSpec {
     pub(crate) fn has_density(&self) -> bool {
         let has = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
         matches!(self, ShapeSpec::Compound { parts } if parts.iter().any(has))
+    }
+
+    /// Returns the surface of each part of a compound, with the parts of compounds in it one by one, as
+    /// [`Shape::compound`] makes them.
+    pub(crate) fn surfaces(&self) -> Vec<Option<PartSurface>> {
+        let ShapeSpec::Compound { parts } = self else { return vec![None] };
+        let of_part = |part: &CompoundPartSpec| {
+            let own = part.surface;
+            part.shape.surfaces().into_iter().map(move |inner| inner.or(own))
+        };
+        parts.iter().flat_map(of_part).collect()
     }
 
     /// Adds `by` to the indices of its meshes.
@@ -213,7 +253,7 @@ fn check(f: &mut Fields<'_>, key: &'static str, made: Result<Shape, ShapeError>)
 }
 
 /// Returns the compound of the list `parts`; `None` if a part is wrong.
-fn read_compound(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> Option<ShapeSpec> {
+fn read_compound(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeSpec> {
     let example = "{ type = \"sphere\", radius_m = 0.5, position_m = [1, 0, 0] }";
     let expected = format!("a list of shapes, such as [{example}]");
     let given = f.required("parts", &expected)?;
@@ -229,7 +269,9 @@ fn read_compound(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> 
     let mut parts = Vec::with_capacity(count);
     for (n, value) in values.into_iter().enumerate() {
         let Some(mut part) = Fields::of(f.log, value, named(n), example) else { continue };
-        let Some(shape) = ShapeSpec::read_part(&mut part, meshes) else {
+        let surface = read_surface(&mut part, context);
+        let base = context.surface.map(|(library, body)| (library, surface.unwrap_or(body)));
+        let Some(shape) = ShapeSpec::read_part(&mut part, ShapeContext { surface: base, ..context }) else {
             part.give_up();
             continue;
         };
@@ -241,7 +283,7 @@ fn read_compound(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> 
         let pose = rotation::read_pose(&mut part);
         let density_kg_per_m3 = part.optional_number("density_kg_per_m3", Bound::POSITIVE);
         part.finish();
-        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3 });
+        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3, surface });
     }
     let own = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
     if let Some(n) = parts.iter().position(|part| own(part) != own(&parts[0])) {
@@ -249,6 +291,16 @@ fn read_compound(f: &mut Fields<'_>, meshes: &BTreeMap<&str, Option<usize>>) -> 
         f.log.report(f.span.clone(), message, "expected a density for all parts, or for none");
     }
     (parts.len() == count).then_some(ShapeSpec::Compound { parts })
+}
+
+/// Reads the surface of a part of a compound; `None` if it has no key of one.
+fn read_surface(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<PartSurface> {
+    let (library, body) = context.surface?;
+    let own = has_contact(f);
+    let named = read_material(f, library);
+    let base = named.map_or(body.contact, |index| library.materials[index].contact);
+    let surface = PartSurface { material: named.or(body.material), contact: read_contact(f, &base) };
+    (own || named.is_some()).then_some(surface)
 }
 
 /// Returns the mesh named by `mesh`; `None` if there is no such mesh or it is itself wrong.

@@ -40,7 +40,9 @@ impl Writer<'_> {
 
     /// Returns the keys that a body and a template have in common: shape, mass, surface, laws and looks.
     pub(super) fn constants(&mut self, name: &str, body: &RigidBody) -> Table {
-        let mut t = Table::of("shape", self.meshes.shape(body.shape()));
+        let of_parts: Vec<Table> = self.surfaces_of_parts(body);
+        let of_part = |n: usize| of_parts.get(n).cloned().unwrap_or_default();
+        let mut t = Table::of("shape", self.meshes.shape_of_parts(body.shape(), &of_part));
         if !body.is_fixed() {
             t.extend(mass(body));
         }
@@ -54,11 +56,28 @@ impl Writer<'_> {
         t.put_unless(0.0, "angular_damping_per_s", body.angular_damping);
         t.extend(surface::groups(body.group, body.mask));
         t.put_unless(false, "sensor", body.sensor);
+        body.one_way.iter().for_each(|direction| t.put("one_way", *direction));
         let templates = self.like.templates.iter().map(|template| &template.body);
         let known = self.like.bodies.iter().chain(templates).find(|spec| spec.name == name);
         known.and_then(|spec| spec.sound.as_ref()).iter().for_each(|sound| t.put("sound", *sound));
         t.extend(self.look(name, body, &look));
         t
+    }
+
+    /// Returns the surface keys of each part of a compound, as far as they differ from those of the body.
+    fn surfaces_of_parts(&self, body: &RigidBody) -> Vec<Table> {
+        let Some((last, _)) = body.shape_materials().last() else { return Vec::new() };
+        let mut tables = vec![Table::default(); last + 1];
+        for (n, material) in body.shape_materials() {
+            let t = &mut tables[*n];
+            let base = if material.id == body.material.id { body.material } else { self.surface_of(material, t).0 };
+            let constants = surface::contact(material, &base);
+            if t.is_empty() && constants.is_empty() {
+                t.put("friction", material.friction);
+            }
+            t.extend(constants);
+        }
+        tables
     }
 
     /// Returns contact constants and appearance of the material that a part names, and writes its

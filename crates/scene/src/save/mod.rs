@@ -33,8 +33,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use tumble_core::{
-    ArchiveError, ArticulatedBody, LoopJoint, Material, Mimic, Object, ObjectId, RigidBody, ScriptedEvent, Sensor,
-    Template, World,
+    ArchiveError, ArticulatedBody, Collidable, LoopJoint, Material, Mimic, Object, ObjectId, RigidBody, ScriptedEvent,
+    Sensor, Template, World,
 };
 
 use crate::notes::Notes;
@@ -271,7 +271,11 @@ impl Writer<'_> {
 /// number that a part has. A scene numbers its materials from 1 in the order of their names.
 fn materials(world: &World, like: &SceneFile) -> Result<Vec<(u32, MaterialSpec)>, SaveError> {
     let parts = world.ids().iter().filter_map(|&id| world.object(id)?.collidable());
-    let used = parts.flat_map(|c| (0..c.parts()).map(|part| c.material(part).id)).max().unwrap_or(0);
+    let of_part = |c: &dyn Collidable, part: usize| {
+        let own = c.shape_materials(part).iter().map(|(_, material)| material.id);
+        own.chain([c.material(part).id]).max().unwrap_or(0)
+    };
+    let used = parts.flat_map(|c| (0..c.parts()).map(move |part| of_part(c, part))).max().unwrap_or(0);
     if used > MAX_MATERIALS {
         return Err(SaveError::Unsayable(vec![format!("the material {used}, since scenes number theirs from 1")]));
     }

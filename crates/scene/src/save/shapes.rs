@@ -26,8 +26,14 @@ impl Meshes {
         Meshes { folder: folder.into(), names: BTreeMap::new(), tables: String::new(), files: Vec::new() }
     }
 
-    /// Returns a shape as a table. Every kind is written, so a new one is an error here.
+    /// Returns a shape as a table.
     pub(super) fn shape(&mut self, shape: &Shape) -> Table {
+        self.shape_of_parts(shape, &|_| Table::default())
+    }
+
+    /// Returns a shape as a table, with more keys for each part of a compound. Every kind is written, so a new one
+    /// is an error here.
+    pub(super) fn shape_of_parts(&mut self, shape: &Shape, of_part: &dyn Fn(usize) -> Table) -> Table {
         match shape {
             Shape::HalfSpace => Table::of("type", "half_space"),
             Shape::Sphere { radius } => {
@@ -72,10 +78,11 @@ impl Meshes {
                 t
             }
             Shape::Compound(compound) => {
-                let parts = compound.parts().iter().map(|part| {
+                let parts = compound.parts().iter().enumerate().map(|(n, part)| {
                     let mut t = self.shape(&part.shape);
                     t.put_pose(&part.pose);
                     part.density.iter().for_each(|density| t.put("density_kg_per_m3", *density));
+                    t.extend(of_part(n));
                     t
                 });
                 let parts: Vec<Table> = parts.collect();

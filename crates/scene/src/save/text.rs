@@ -109,6 +109,11 @@ impl Table {
         table
     }
 
+    /// Returns whether it has no key.
+    pub(super) fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
     /// Adds a key.
     pub(super) fn put(&mut self, key: &'static str, value: impl Toml) {
         self.keys.push((key, value.toml()));

@@ -82,6 +82,40 @@ fn compounds() {
     );
 }
 
+/// Parts of a compound have the constants of their own keys, else of the material that they name, else of the body.
+#[test]
+fn parts_of_a_compound_have_materials() {
+    let ball = |keys: &str| format!("{{ type = \"sphere\", radius_m = 0.1{keys} }}");
+    let text = |parts: &[String]| {
+        format!(
+            "[materials.ice]\nfriction = 0.02\nrestitution = 0.1\n[[body]]\nname = \"b\"\nmass_kg = 1\nfriction = 0.7\n\
+             adhesion_n = 3\nshape = {{ type = \"compound\", parts = [{}] }}\n",
+            parts.join(", ")
+        )
+    };
+    let inner =
+        format!("{{ type = \"compound\", parts = [{}, {}], friction = 0.4 }}", ball(""), ball(", friction = 0.5"));
+    let parts = [ball(""), ball(", restitution = 0.9"), ball(", material = \"ice\", friction = 0.03"), inner];
+    let (world, _) = SceneFile::parse(&text(&parts), "s.toml").unwrap().build().unwrap();
+    let body = world.get::<tumble_core::RigidBody>(world.ids()[0]).unwrap();
+    let constants = |shape: usize| {
+        let m = body.shape_material(shape);
+        (m.friction, m.restitution, m.adhesion, m.id)
+    };
+    let wanted = [(0.7, 0.0, 3.0, 0), (0.7, 0.9, 3.0, 0), (0.03, 0.1, 0.0, 1), (0.4, 0.0, 3.0, 0), (0.5, 0.0, 3.0, 0)];
+    assert_eq!([0, 1, 2, 3, 4].map(constants), wanted);
+    let own: Vec<usize> = body.shape_materials().iter().map(|(shape, _)| *shape).collect();
+    assert_eq!(own, [1, 2, 3, 4]);
+    let error = |part: &str| SceneFile::parse(&text(&[ball(part)]), "s.toml").unwrap_err().report(false);
+    assert!(error(", friction = -1").contains("`friction` of part 1 of the shape of body \"b\" is -1"));
+    assert!(error(", material = \"iec\"").contains("did you mean `ice`"), "{}", error(", material = \"iec\""));
+    // links have several shapes with constants of their own instead
+    let link = "[[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\nshape = { type = \"compound\", parts = \
+                [{ type = \"sphere\", radius_m = 1, friction = 1 }], density_kg_per_m3 = 1 }\njoint = { type = \"fixed\" }\n";
+    let error = SceneFile::parse(link, "s.toml").unwrap_err().report(false);
+    assert!(error.contains("unknown key `friction`"), "{error}");
+}
+
 /// A compound whose parts have densities needs no mass.
 #[test]
 fn a_compound_has_the_densities_of_its_parts() {

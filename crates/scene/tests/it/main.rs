@@ -21,6 +21,7 @@ mod mjcf_damaged;
 mod mjcf_written;
 mod mujoco;
 mod names;
+mod npy;
 mod on_floor;
 mod pinocchio;
 mod repair;

@@ -231,6 +231,13 @@ fn made_in_code() -> World {
     world.add(RigidBody::new(Shape::sphere(1.0).unwrap()).with_name("trigger").with_sensor(true)).unwrap();
     let pusher = RigidBody::fixed(Shape::sphere(0.2).unwrap()).with_name("pusher").with_velocity(Vec3::x());
     world.add_boxed(Box::new(pusher.with_pose(tilted(40.0))), Mode::Kinematic).unwrap();
+    let parts =
+        [0.0, 0.4, 0.8, 1.2].map(|x| CompoundPart::new(Shape::sphere(0.1).unwrap(), Pose::translation(x, 0.0, 0.0)));
+    let sled = RigidBody::new(Shape::compound(parts.into()).unwrap()).with_name("sled").with_pose(tilted(-9.0));
+    let plain = Material { friction: 0.3, ..Material::default() };
+    let sled = sled.with_material(plain).with_shape_material(0, odd).with_shape_material(2, plain);
+    let sled = sled.with_one_way(Vec3::new(0.1, 0.2, 2.0));
+    world.add(sled.with_shape_material(3, Material { friction: 0.01, ..plain })).unwrap();
     add_crane(&mut world, mesh);
     add_joints(&mut world);
     let [a, b] = ["body \"0\"", "crane"].map(|name| world.find(name).unwrap());

@@ -379,6 +379,7 @@ impl BodyPair<'_> {
             core_a: 0.0,
             core_b: 0.0,
             normal_from: NormalFrom::Edges,
+            shapes: [0; 2],
         }
     }
 }

@@ -396,6 +396,7 @@ impl<'a> Query<'a> {
             core_a: radius,
             core_b: hit.core,
             normal_from,
+            shapes: [0; 2],
         };
         match self.second {
             None => contact,

@@ -33,6 +33,8 @@ pub struct RayCastHit {
     pub id: ObjectId,
     /// Its part.
     pub part: usize,
+    /// The shape of the part: the index of a compound's part; 0 for all other shapes.
+    pub shape: usize,
     /// Distance from the origin of the ray, meters.
     pub distance: f64,
     /// Outward unit normal of the surface there, world axes.
@@ -122,7 +124,7 @@ impl<'w> Targets<'w> {
         }
         let (mut limit, mut best) = (ray.max_distance, None::<(usize, RayCastHit)>);
         let mut meet = |part: &Part<'_>, limit: &mut f64| {
-            let Some(RayHit { distance, normal, face }) =
+            let Some(RayHit { distance, normal, face, shape }) =
                 part.shape.cast_ray(&part.pose, &ray.origin, &direction, *limit)
             else {
                 return;
@@ -130,7 +132,8 @@ impl<'w> Targets<'w> {
             let row = part.entry.state_range.parts.start + part.part;
             if best.as_ref().is_none_or(|(other, hit)| distance < hit.distance || row < *other) {
                 *limit = distance;
-                best = Some((row, RayCastHit { id: part.id, part: part.part, distance, normal, face }));
+                let shape = shape as usize;
+                best = Some((row, RayCastHit { id: part.id, part: part.part, shape, distance, normal, face }));
             }
         };
         self.unbounded.iter().for_each(|part| meet(part, &mut limit));

@@ -17,6 +17,8 @@ pub struct ShapeOverlap {
     pub id: ObjectId,
     /// Its part.
     pub part: usize,
+    /// The shape of the part: the index of a compound's part; 0 for all other shapes.
+    pub shape: usize,
     /// Depth of the deepest contact, meters, above 0.
     pub depth: f64,
 }
@@ -28,6 +30,8 @@ pub struct BodyDistance {
     pub a: Option<(ObjectId, usize)>,
     /// The other one.
     pub b: (ObjectId, usize),
+    /// The shapes that the points are of, of A and of B: the index of a compound's part; 0 for all others.
+    pub shapes: [usize; 2],
     /// Distance, meters; minus the depth of the deepest contact if they overlap.
     pub distance: f64,
     /// A point of the surface of A, and one of B, world axes, meters.
@@ -43,6 +47,8 @@ pub struct PointDepth {
     pub id: ObjectId,
     /// Its part.
     pub part: usize,
+    /// The shape of the part: the index of a compound's part; 0 for all other shapes.
+    pub shape: usize,
     /// Depth below its surface, meters; negative outside: minus the distance.
     pub depth: f64,
     /// Closest point of its surface, world axes, meters.
@@ -58,6 +64,8 @@ pub struct ShapeCastHit {
     pub id: ObjectId,
     /// Its part.
     pub part: usize,
+    /// The shape of the part: the index of a compound's part; 0 for all other shapes.
+    pub shape: usize,
     /// Distance that the shape moves until it touches, meters.
     pub distance: f64,
     /// Point of the touch, world axes, meters.
@@ -77,8 +85,9 @@ impl World {
             }
             found.clear();
             contacts_in_mode(part.mode, shape, pose, part.shape, &part.pose, 0.0, &mut found);
-            let depth = found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)?;
-            (depth > 0.0).then_some(ShapeOverlap { id: part.id, part: part.part, depth })
+            let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).filter(|deepest| deepest.gap < 0.0)?;
+            let shape = deepest.shapes[1] as usize;
+            Some(ShapeOverlap { id: part.id, part: part.part, shape, depth: -deepest.gap })
         };
         self.parts_by(filter).filter_map(overlap).collect()
     }
@@ -136,8 +145,8 @@ impl World {
             let closest = part.shape.closest_point(&part.pose, point);
             let depth = -closest.distance;
             if depth.is_finite() && best.is_none_or(|best| depth > best.depth) {
-                let (point, normal) = (closest.point, closest.normal);
-                best = Some(PointDepth { id: part.id, part: part.part, depth, point, normal });
+                let (point, normal, shape) = (closest.point, closest.normal, closest.shape as usize);
+                best = Some(PointDepth { id: part.id, part: part.part, shape, depth, point, normal });
             }
         }
         best
@@ -191,7 +200,8 @@ fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>)
         }
         if pair.distance <= met || advance >= MAX_ADVANCES {
             let point = 0.5 * (pair.points[0] + pair.points[1]);
-            return Some(ShapeCastHit { id: part.id, part: part.part, distance, point, normal: pair.normal });
+            let shape = pair.shapes[1] as usize;
+            return Some(ShapeCastHit { id: part.id, part: part.part, shape, distance, point, normal: pair.normal });
         }
         let closing = -direction.dot(&pair.normal);
         let speed = if by_normal { closing } else { 1.0 };
@@ -225,7 +235,8 @@ fn nearest<'w>(
         let Some(pair) = closest_points(shape, pose, part.shape, &part.pose) else { continue };
         if best.is_none_or(|best| pair.distance < best.distance) {
             let b = (part.id, part.part);
-            *best = Some(BodyDistance { a, b, distance: pair.distance, points: pair.points, normal: pair.normal });
+            let (shapes, distance) = (pair.shapes.map(|shape| shape as usize), pair.distance);
+            *best = Some(BodyDistance { a, b, shapes, distance, points: pair.points, normal: pair.normal });
         }
     }
 }

@@ -37,9 +37,10 @@ impl World {
     /// mass, shape (3, 3) or (3,), kg·m², by default that of a uniform body; center_of_mass: in the
     /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
     /// rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
-    /// ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface.
+    /// ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface. one_way: as
+    /// the property.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None, one_way=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -68,6 +69,7 @@ impl World {
         locked: Option<Vec<String>>,
         non_spinning: bool,
         intersect: Option<&Bound<'_, PyAny>>,
+        one_way: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
@@ -97,13 +99,14 @@ impl World {
         if let Some(center) = center_of_mass {
             body = body.with_center_of_mass(vec3(center, "center_of_mass")?);
         }
-        let body = body.with_velocity(motion[0]).with_angular_velocity(motion[1]);
+        let mut body = body.with_velocity(motion[0]).with_angular_velocity(motion[1]);
+        body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         add(&self.shared, py, body, mode, collidable, intersect)
     }
 
     /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-    /// group, mask, sensor, intersect: as in ``add_rigid``.
-    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None))]
+    /// group, mask, sensor, intersect, one_way: as in ``add_rigid``.
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None, one_way=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
@@ -120,16 +123,18 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         sensor: bool,
         intersect: Option<&Bound<'_, PyAny>>,
+        one_way: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
-        let body = Rigid::fixed(shape.solid.clone())
+        let mut body = Rigid::fixed(shape.solid.clone())
             .with_name(name)
             .with_pose(pose)
             .with_material(Material { restitution, friction, ..Material::default() })
             .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
             .with_groups(query::group(group)?, query::mask(mask)?)
             .with_sensor(sensor);
+        body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         add(&self.shared, py, body, Mode::Static, collidable, intersect)
     }
 

@@ -15,7 +15,8 @@ impl World {
     /// The contacts of the last step: a structured array with one row each.
     ///
     /// Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
-    /// for articulated bodies the indices of the links in their ``link_names``; ``point`` (3,), m;
+    /// for articulated bodies the indices of the links in their ``link_names``; ``shapes`` (2,), as
+    /// ``shape`` in ``cast_rays``; ``point`` (3,), m;
     /// ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
     /// apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
     /// m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
@@ -48,9 +49,10 @@ impl World {
     /// serves all. max_distance: length of the rays, m, a number or shape (n,); None: unlimited.
     ///
     /// Fields: ``distance``, m, infinite for a miss; ``body``, its number in ``world.bodies``, -1 for
-    /// a miss; ``part``, for an articulation the index of the link in its ``link_names``; ``face``,
+    /// a miss; ``part``, for an articulation the index of the link in its ``link_names``; ``shape``, the
+    /// index of a compound's part, and on a link that among its shapes that collide, in their order; ``face``,
     /// the index of a mesh's triangle, 0 to 5 for -x, +x, -y, +y, -z and +z of a box, 0 to 2 for side,
-    /// -z end and +z end of a cylinder, else 0; ``normal`` (3,), unit, outward, world axes.
+    /// -z end and +z end of a cylinder, of a compound the face of that part, else 0; ``normal`` (3,), unit, outward, world axes.
     ///
     /// A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
     /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
@@ -76,7 +78,7 @@ impl World {
     ///
     /// direction: shape (3,), of any length above 0, world axes. max_distance: how far it moves, m,
     /// finite. position, orientation: where it starts. Fields: ``distance``, m, 0 if it overlaps at
-    /// the start; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), m;
+    /// the start; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), m;
     /// ``normal`` (3,), unit, from the body towards the shape.
     #[pyo3(signature = (shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -96,8 +98,8 @@ impl World {
         query::cast_shape(&self.shared, py, &shape, direction, max_distance, at, &selection)
     }
 
-    /// Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``
-    /// and ``part``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
+    /// Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``,
+    /// ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
     ///
     /// position, orientation: as in ``add_rigid``. group, mask, ignore: as in ``cast_rays``.
     #[pyo3(signature = (shape, position=None, orientation=None, *, group=0, mask=None, ignore=None))]
@@ -119,8 +121,8 @@ impl World {
     /// if ``b`` is None. None if a body has no shape or is disabled.
     ///
     /// a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
-    /// negative depth if they overlap; ``bodies`` (2,) and ``parts`` (2,) as in ``contacts``, -1 for a
-    /// shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
+    /// negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
+    /// for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
     /// the first. group, mask, ignore: of a shape, as in ``cast_rays``.
     #[pyo3(signature = (a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
@@ -158,7 +160,7 @@ impl World {
     ///
     /// Fields: ``depth``, m, below the surface of the body in which the point is deepest, and for a
     /// point outside of all bodies minus the distance from the nearest one, minus infinity if there
-    /// is none; ``body``, ``part`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
+    /// is none; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
     /// point of the surface, m; ``normal`` (3,), unit, outward.
     #[pyo3(signature = (points, *, group=0, mask=None, ignore=None))]
     fn point_depth<'py>(

@@ -2,7 +2,7 @@
 
 use nalgebra::Translation3;
 use tumble_core::articulated::LinkMass;
-use tumble_core::collide::{Pose, Vec3};
+use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{Collidable, Mode, Object, ObjectId, RigidBody};
 
 use super::MjcfWriter;
@@ -66,13 +66,25 @@ impl MjcfWriter<'_> {
         let visual = visual_of(&mut left, body.shape(), &Pose::identity());
         let Some(parts) = body.collidable() else { return };
         let mut common = self.surface(name, parts, 0, collides, visual.map(|visual| &visual.appearance));
-        if let Some(label) = label.filter(|_| !matches!(body.shape(), tumble_core::collide::Shape::Compound(_))) {
+        if let Some(label) = label.filter(|_| !matches!(body.shape(), Shape::Compound(_))) {
             common.put("name", label);
+        }
+        if body.one_way.is_some() {
+            self.note(name, "bodies that collide on one side only collide on all sides in MuJoCo");
         }
         if parts.is_sensor(0) {
             self.note(name, "bodies that only report overlaps do not collide in MuJoCo, and report nothing");
         }
-        self.geoms(name, pose, body.shape(), &common);
+        match body.shape() {
+            Shape::Compound(compound) if collides && !parts.is_sensor(0) && !body.shape_materials().is_empty() => {
+                for (n, part) in compound.parts().iter().enumerate() {
+                    let own = self.friction(name, &body.shape_material(n));
+                    let others = common.without(&["friction", "condim"]);
+                    self.geoms(name, &(pose * part.pose), &part.shape, &others.joined(&own));
+                }
+            }
+            shape => self.geoms(name, pose, shape, &common),
+        }
         let center = Pose::from_parts(Translation3::from(body.shape().center_of_mass()), nalgebra::one());
         for visual in left.into_iter().filter(|visual| visual.drawn().is_some()) {
             let mut visual = visual.clone();

@@ -167,7 +167,7 @@ impl MjcfWriter<'_> {
         }
     }
 
-    fn friction(&mut self, owner: &str, material: &Material) -> Attributes {
+    pub(super) fn friction(&mut self, owner: &str, material: &Material) -> Attributes {
         let plain = Material::default();
         let Material { friction, rolling_friction, torsional_friction, .. } = *material;
         let said = Material { friction, rolling_friction, torsional_friction, id: material.id, ..plain };

@@ -26,6 +26,11 @@ impl Attributes {
         self.0.extend(others.0.iter().cloned());
     }
 
+    /// Returns the attributes without those of some names.
+    pub(super) fn without(&self, names: &[&str]) -> Attributes {
+        Attributes(self.0.iter().filter(|(name, _)| !names.contains(name)).cloned().collect())
+    }
+
     /// Adds a text unless a value is the default of MJCF.
     pub(super) fn put_unless<T: PartialEq>(&mut self, default: T, name: &'static str, value: T, text: impl AsRef<str>) {
         if value != default {

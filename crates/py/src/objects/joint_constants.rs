@@ -1,0 +1,97 @@
+//! Damping, dry friction and springs of the joints of an articulation, settable while it runs.
+
+use crate::arrays::convert::{bounds, shown};
+use crate::errors::{Error, Result};
+use crate::objects::articulation::Articulation;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use tumble::dynamics::{ArticulatedBody, DofSettings, Spring};
+
+impl Articulation {
+    /// Returns one number of each degree of freedom.
+    fn of_dofs<'py>(&self, py: Python<'py>, get: impl Fn(&DofSettings) -> f64) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.spot.dofs()?.iter().map(get).collect()))
+    }
+
+    /// Sets lower and upper limits of all degrees of freedom of a body in a world.
+    pub(super) fn change_limits(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let (place, dof, limits) = (self.in_world()?, self.robot.dof(), bounds(value, "limits")?);
+        if limits.shape != [dof, 2] {
+            let shape = shown(&limits.shape);
+            return Err(Error::value(format!("limits: expected shape ({dof}, 2), got {shape}")));
+        }
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let mut changed = body.clone();
+            for (index, pair) in limits.data.chunks_exact(2).enumerate() {
+                let limits = (pair[0].is_finite() || pair[1].is_finite()).then_some([pair[0], pair[1]]);
+                let settings = changed.dofs()[index].clone();
+                changed.set_dof(index, DofSettings { limits, ..settings })?;
+            }
+            *body = changed;
+            Ok(())
+        })
+    }
+}
+
+/// Returns the spring with another constant; none without stiffness and rest.
+fn spring(dof: &DofSettings, change: impl FnOnce(&mut Spring)) -> Option<Spring> {
+    let mut spring = dof.spring.unwrap_or(Spring { stiffness: 0.0, rest: 0.0 });
+    change(&mut spring);
+    (spring.stiffness != 0.0 || spring.rest != 0.0).then_some(spring)
+}
+
+#[pymethods]
+impl Articulation {
+    /// Viscous damping of each degree of freedom, shape (dof,), N·m·s/rad or N·s/m. Settable for a body in a world: a
+    /// number for all, or shape (dof,).
+    #[getter]
+    fn joint_damping<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        self.of_dofs(py, |dof| dof.damping)
+    }
+
+    #[setter]
+    fn set_joint_damping(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("joint_damping", value), |dof, damping| DofSettings { damping, ..dof })
+    }
+
+    /// Dry friction of each degree of freedom, shape (dof,), N·m or N. Settable like ``joint_damping``.
+    #[getter]
+    fn joint_friction<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        self.of_dofs(py, |dof| dof.friction)
+    }
+
+    #[setter]
+    fn set_joint_friction(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("joint_friction", value), |dof, friction| DofSettings { friction, ..dof })
+    }
+
+    /// Stiffness of the spring of each degree of freedom, shape (dof,), N·m/rad or N/m; 0 without one. Settable like
+    /// ``joint_damping``; that of a drive is an argument of ``set_drive``.
+    #[getter]
+    fn stiffness<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        self.of_dofs(py, |dof| dof.spring.map_or(0.0, |spring| spring.stiffness))
+    }
+
+    #[setter]
+    fn set_stiffness(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("stiffness", value), |dof, stiffness| {
+            let spring = spring(&dof, |spring| spring.stiffness = stiffness);
+            DofSettings { spring, ..dof }
+        })
+    }
+
+    /// Rest position of the spring of each degree of freedom, shape (dof,), rad or m. Settable like ``joint_damping``.
+    #[getter]
+    fn rest<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        self.of_dofs(py, |dof| dof.spring.map_or(0.0, |spring| spring.rest))
+    }
+
+    #[setter]
+    fn set_rest(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_dofs(py, ("rest", value), |dof, rest| {
+            let spring = spring(&dof, |spring| spring.rest = rest);
+            DofSettings { spring, ..dof }
+        })
+    }
+}
