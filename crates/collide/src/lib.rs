@@ -61,7 +61,8 @@ pub use pose::{Aabb, Mat3, Pose, Quat, Vec3};
 pub use ray::{BoxTree, RayHit};
 pub use shape::{CompoundPart, CompoundShape, CylinderShape, MeshShape, Shape};
 pub use tree::{
-    Builder, CachedTree, Covering, LevelQuality, LevelSphere, MeshId, Progress, QualitySettings, SphereNode,
-    SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns, grow_to_cover,
+    Builder, CachedTree, CoveredShape, Covering, CoveringSphere, LevelQuality, LevelSphere, MeshId, Progress,
+    QualitySettings, SphereNode, SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns,
+    grow_to_cover,
 };
 pub use union_find::UnionFind;

@@ -35,7 +35,7 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::CachedTree;
-pub use covering::Covering;
+pub use covering::{CoveredShape, Covering, CoveringSphere};
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelSphere;
 pub use quality::{LevelQuality, QualitySettings};

@@ -3,7 +3,9 @@
 
 use crate::rng::Rng;
 use crate::shared_meshes::text;
-use tumble_collide::{Builder, Covering, MeshDistance, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover};
+use tumble_collide::{
+    Builder, CoveredShape, Covering, MeshDistance, SphereTree, TreeSettings, TriMesh, Vec3, grow_to_cover,
+};
 
 const BUILDERS: [Builder; 2] = [Builder::Grid, Builder::Hubbard];
 
@@ -189,14 +191,17 @@ fn a_covering_covers_and_its_error_never_grows() {
     let hull = bowl.convex_hull().unwrap();
     let plate = TriMesh::cuboid(Vec3::new(1.0, 1.0, 0.1));
     for (given, solid) in [(&plate, &plate), (&bowl, &hull)] {
-        let mut covering = Covering::new(given, solid);
+        let closed = (given.vertices != solid.vertices).then(|| solid.clone());
+        let shape = CoveredShape { given: given.clone(), closed, bulge: 0.0, covered: true };
+        let mut covering = Covering::new(&[shape], 1.0).unwrap();
         let mut last = f64::INFINITY;
         for count in 1..40 {
             assert_eq!(covering.count(), count);
             assert!(covering.worst() <= last, "{count}: {} after {last}", covering.worst());
             last = covering.worst();
             // the other proof of coverage: no sphere has to grow except for rounding
-            let mut spheres: Vec<(Vec3, f64)> = covering.spheres().map(|(c, r, _)| (c, r * (1.0 + 1e-9))).collect();
+            let mut spheres: Vec<(Vec3, f64)> =
+                covering.spheres().map(|s| (s.center, s.radius * (1.0 + 1e-9))).collect();
             if count == 13 {
                 let grown = grow_to_cover(&mut spheres, given);
                 assert!(grown <= 2e-5 * given.diagonal(), "{count}: {grown}");

@@ -24,14 +24,16 @@
 //! Other elements (transmissions, sensors, extensions of simulators) are ignored. The root link is
 //! fixed to the base, or floats with [`UrdfOptions::floating`].
 
+mod chain;
 mod error;
 mod files;
+mod fit;
 mod joint;
 pub(crate) mod link;
 mod load;
 mod options;
 mod read;
-mod share;
+mod self_collision;
 mod spheres;
 mod tree;
 
@@ -39,4 +41,5 @@ pub use error::UrdfError;
 pub use load::{UrdfModel, load, model, parse_model};
 pub use options::{CollisionMeshes, MissingMeshes, UrdfOptions};
 pub(crate) use read::{Content, read_file, read_text, text_of};
-pub use spheres::{LinkSpheres, SphereOptions, SphereRobot, spherize};
+pub use self_collision::{JointPositions, MAX_POSES, Overlap};
+pub use spheres::{LinkSpheres, PerLink, SphereOptions, SphereRobot, spherize};

@@ -1,29 +1,29 @@
 //! Replaces a robot's collision geometry by spheres, for motion planners and for fast contact.
 //!
 //! Only the `<collision>` elements of the URDF's text change: each becomes one element per sphere,
-//! which keeps its attributes and its children other than `<origin>` and `<geometry>`. Spheres stay
-//! spheres. The other shapes of a link start with one sphere each. As long as the link may have one
-//! more, the shape whose spheres reach furthest outside it gets it ([`share`]), so more spheres
-//! never reach further.
+//! which keeps its attributes and its children other than `<origin>` and `<geometry>`. A sphere that
+//! covers pieces of several elements is written instead of the one with the most pieces, and an
+//! element whose surface other spheres cover disappears. [`fit`](super::fit) chooses the spheres.
 //!
-//! | shape | spheres |
+//! | shape | surface that is covered |
 //! |---|---|
-//! | capsule | on its axis at equal distances `d`, of radius `√(R² + d²/4)`: they cover it and reach `√(R² + d²/4) − R` outside |
-//! | cylinder between two spheres that contain its rounded ends | on its axis in the middle of `n` equal pieces of length `d`, of the same radius: with the ends it is a capsule, outside of which they reach as far |
-//! | box, other cylinder, mesh | spheres that contain all pieces of its surface, the worst divided in two each time ([`Covering`](tumble_core::collide::Covering)); at 4, 8, 16, … spheres those of a tree are tried, and used if they reach less far |
-//! | open mesh | as for the mesh with its holes closed, else for its convex hull; the given surface is covered |
+//! | sphere, capsule, cylinder with a sphere about each end | by formula ([`chain`](super::chain)), or that of a prism with the height of the arcs above it |
+//! | box, other cylinder, closed mesh | the part outside the other shapes of the link |
+//! | open mesh | all of it; it is measured against the mesh with its holes closed, else against its convex hull |
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use roxmltree::Node;
-use tumble_core::collide::{MeshError, Pose, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
+use tumble_core::collide::{MeshError, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use super::error::UrdfError;
+use super::fit::{Fit, Form, fit, placed};
 use super::link::{Context, read_shape};
 use super::options::UrdfOptions;
 use super::read::{Content, read_text, text_of};
-use super::share::{self, Share};
+use super::self_collision::{self, TreeLink};
 use crate::build::mesh_files::{read_file, stretched};
 use crate::notes::NoteList;
 use crate::parse::link::{Geometry, LinkShape};
@@ -31,22 +31,19 @@ use crate::parse::log::Log;
 use crate::parse::shape::ShapeSpec;
 use crate::xml::{self, Element};
 
-/// Sides of the prism around a cylinder.
-const SIDES: usize = 48;
 /// Relative enlargement of written spheres, so that they still cover the shape after the rounding
 /// of any reader.
 const ROUNDING: f64 = 1e-9;
 
-/// Share of a cylinder's radius by which a sphere at its end may be too small.
-const ROUND: f64 = 1e-9;
-
 /// Options of the covering by spheres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereOptions {
-    /// Largest number of spheres of a link. A link with more collision elements is an error.
-    pub most: usize,
-    /// Spheres that reach at most this far outside a shape are not divided: a fraction of the
-    /// shape's diagonal.
+    /// Largest number of spheres of a link, 1 to 10,000.
+    pub most: PerLink<usize>,
+    /// Share of the outer surface of a link that is covered at least, by area: above 0, at most 1.
+    pub coverage: PerLink<f64>,
+    /// Spheres that extend at most this far outside a link are not divided: a fraction of the
+    /// link's diagonal.
     pub error: f64,
     /// How trees are built.
     pub tree: TreeSettings,
@@ -54,6 +51,31 @@ pub struct SphereOptions {
     pub cache: TreeCache,
     /// How the URDF is read.
     pub urdf: UrdfOptions,
+}
+
+/// A value for all links, and others for some.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PerLink<T> {
+    /// The value of the links that are not named.
+    pub common: T,
+    /// Values by the name of the link.
+    pub links: BTreeMap<String, T>,
+}
+
+impl<T: Copy> PerLink<T> {
+    /// Returns the same value for all links.
+    pub fn all(common: T) -> PerLink<T> {
+        PerLink { common, links: BTreeMap::new() }
+    }
+
+    fn values(&self) -> impl Iterator<Item = &T> {
+        self.links.values().chain([&self.common])
+    }
+
+    /// Returns the value of a link.
+    pub fn of(&self, link: &str) -> T {
+        self.links.get(link).copied().unwrap_or(self.common)
+    }
 }
 
 /// A robot of spheres.
@@ -67,6 +89,8 @@ pub struct SphereRobot {
     pub links: Vec<LinkSpheres>,
     /// Notes about the file and its meshes.
     pub notes: Vec<String>,
+    /// All links, a parent before its children.
+    pub(super) tree: Vec<TreeLink>,
 }
 
 /// The spheres of a link.
@@ -78,38 +102,25 @@ pub struct LinkSpheres {
     pub shapes: usize,
     /// Center in the link's frame and radius, meters.
     pub spheres: Vec<(Vec3, f64)>,
-    /// Upper bound of the distance by which each reaches outside its shape, meters.
+    /// Upper bound of the distance by which each extends outside the shapes of the link, meters.
     pub outward: Vec<f64>,
+    /// Share of the outer surface, by area, that is proved to lie inside the spheres: 1, or with a
+    /// smaller [`SphereOptions::coverage`] that of the pieces that lie in one sphere.
+    pub coverage: f64,
 }
 
-/// A collision element: its pose, its shape, and the surface to cover in its own frame. Spheres and
-/// capsules have formulas.
+/// A collision element, and its shape in the frame of the link.
 struct Part<'a, 'd> {
     node: Node<'a, 'd>,
-    shape: LinkShape,
-    surface: Surface,
-}
-
-pub(super) enum Surface {
-    Sphere(f64),
-    /// Radius, and length of the straight part.
-    Capsule(f64, f64),
-    /// Radius and length of a cylinder whose ends, with half balls on them, are in other spheres of the link.
-    Barrel(f64, f64),
-    /// The surface to cover, a closed surface around at least the same solid, and how far that is
-    /// outside the shape it replaces.
-    Mesh {
-        given: TriMesh,
-        solid: TriMesh,
-        slack: f64,
-    },
+    form: Form,
 }
 
 /// Reads a robot and covers its links by spheres. `progress` receives the fraction of links that
 /// are done.
 ///
 /// # Errors
-/// [`UrdfError`]: as [`load`](super::load), and meshes that cannot be read.
+/// [`UrdfError`]: as [`load`](super::load), meshes that cannot be read, numbers out of range, and values for links
+/// without collision geometry.
 pub fn spherize(
     path: impl AsRef<Path>,
     options: &SphereOptions,
@@ -132,65 +143,71 @@ pub fn spherize(
         notes: NoteList::default(),
     };
     let elements: Vec<Element> = Element::new(&log, document.root_element()).children("link").collect();
+    check_links(&elements, options).map_err(wrong)?;
     let (mut links, mut edits) = (Vec::new(), Vec::new());
     for (n, link) in elements.iter().enumerate() {
         let name = link.text("name").unwrap_or("").to_owned();
         let parts = parts(link, &mut context).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
         if !parts.is_empty() {
-            let shares = share::shared(parts.iter().map(|part| &part.surface), options)
+            let (nodes, forms): (Vec<Node>, Vec<Form>) = parts.into_iter().map(|part| (part.node, part.form)).unzip();
+            let fit = fit(&forms, options.most.of(&name), options.coverage.of(&name), options)
                 .map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
-            links.push(written(name, &parts, &shares, &text, &mut edits).map_err(wrong)?);
+            links.push(written(name, &nodes, &fit, &text, &mut edits).map_err(wrong)?);
         }
         progress.report((n + 1) as f64 / elements.len() as f64);
     }
+    let tree = self_collision::tree(&robot, links.iter().map(|link| link.name.as_str()));
     let notes = robot.notes.into_iter().chain(context.notes.take()).collect();
-    Ok(SphereRobot { name: robot.name, text: edited(&text, edits), links, notes })
+    Ok(SphereRobot { name: robot.name, text: edited(&text, edits), links, notes, tree })
 }
 
-/// Returns the collision elements of a link with their surfaces, without those that the options
-/// leave out.
+/// Largest number of spheres of a link.
+const MAX_SPHERES: usize = 10_000;
+
+/// Checks the numbers, and that the links with values of their own exist.
+fn check_links(elements: &[Element<'_, '_>], options: &SphereOptions) -> Result<(), String> {
+    let names: Vec<&str> = elements
+        .iter()
+        .filter(|link| link.children("collision").next().is_some())
+        .filter_map(|link| link.text("name"))
+        .collect();
+    if let Some(most) = options.most.values().find(|most| !(1..=MAX_SPHERES).contains(*most)) {
+        return Err(format!("{most} spheres for a link; expected 1 to {MAX_SPHERES}"));
+    }
+    if let Some(coverage) = options.coverage.values().find(|share| !(**share > 0.0 && **share <= 1.0)) {
+        return Err(format!("a coverage of {coverage}; expected a share above 0 and at most 1"));
+    }
+    match options.most.links.keys().chain(options.coverage.links.keys()).find(|link| !names.contains(&link.as_str())) {
+        Some(link) => {
+            Err(format!("there is no link \"{link}\" with collision geometry; the links are {}", names.join(", ")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Returns the collision elements of a link, without those that the options leave out.
 fn parts<'a, 'd>(link: &Element<'a, 'd>, context: &mut Context<'_>) -> Result<Vec<Part<'a, 'd>>, String> {
     let mut parts = Vec::new();
     for element in link.children("collision") {
         let Some(shape) = read_shape(&element, true, context) else { continue };
-        let surface = surface(&shape.geometry, context)?;
-        parts.push(Part { node: element.node(), shape, surface });
-    }
-    let barrels: Vec<Option<Surface>> = parts.iter().map(|part| barrel(part, &parts)).collect();
-    for (part, barrel) in parts.iter_mut().zip(barrels) {
-        if let Some(surface) = barrel {
-            part.surface = surface;
-        }
+        parts.push(Part { node: element.node(), form: form(&shape, context)? });
     }
     Ok(parts)
 }
 
-/// Returns the surface of a cylinder that is a capsule together with spheres of its link at both ends.
-fn barrel(part: &Part<'_, '_>, parts: &[Part<'_, '_>]) -> Option<Surface> {
-    let Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) = part.shape.geometry else { return None };
-    let in_a_sphere = |end: f64| {
-        let end = (part.shape.pose * nalgebra::Point3::new(0.0, 0.0, end)).coords;
-        parts.iter().any(|other| match other.surface {
-            Surface::Sphere(radius) => {
-                (other.shape.pose.translation.vector - end).norm() + radius_m <= radius + ROUND * radius_m
-            }
-            _ => false,
-        })
-    };
-    let ends = [-0.5 * length_m, 0.5 * length_m];
-    ends.into_iter().all(in_a_sphere).then_some(Surface::Barrel(radius_m, length_m))
-}
-
-fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, String> {
-    let closed = |mesh: TriMesh, slack: f64| Surface::Mesh { given: mesh.clone(), solid: mesh, slack };
-    match geometry {
-        Geometry::Shape(ShapeSpec::Sphere { radius_m }) => Ok(Surface::Sphere(*radius_m)),
-        Geometry::Shape(ShapeSpec::Capsule { radius_m, length_m }) => Ok(Surface::Capsule(*radius_m, *length_m)),
-        Geometry::Shape(ShapeSpec::Box { size_m }) => Ok(closed(TriMesh::cuboid(Vec3::from(*size_m)), 0.0)),
+/// Returns the shape in the frame of the link.
+fn form(shape: &LinkShape, context: &mut Context<'_>) -> Result<Form, String> {
+    let pose = shape.pose;
+    match &shape.geometry {
+        Geometry::Shape(ShapeSpec::Sphere { radius_m }) => Ok(Form::Capsule { radius: *radius_m, length: 0.0, pose }),
+        Geometry::Shape(ShapeSpec::Capsule { radius_m, length_m }) => {
+            Ok(Form::Capsule { radius: *radius_m, length: *length_m, pose })
+        }
+        Geometry::Shape(ShapeSpec::Box { size_m }) => {
+            Ok(Form::Mesh { given: placed(TriMesh::cuboid(Vec3::from(*size_m)), &pose), closed: None })
+        }
         Geometry::Shape(ShapeSpec::Cylinder { radius_m, length_m }) => {
-            // Circumscribed about the cylinder, so a covering of the prism covers the cylinder.
-            let outer = radius_m / libm::cos(std::f64::consts::PI / SIDES as f64);
-            Ok(closed(TriMesh::cylinder(outer, *length_m, SIDES), outer - radius_m))
+            Ok(Form::Cylinder { radius: *radius_m, length: *length_m, pose })
         }
         Geometry::Shape(other) => Err(format!("{other:?} is not a shape of a URDF")),
         Geometry::Solid { name, .. } => Err(format!("{name} is not a shape of a URDF")),
@@ -200,7 +217,9 @@ fn surface(geometry: &Geometry, context: &mut Context<'_>) -> Result<Surface, St
                 .map_err(|why| format!("{}: {why}", path.display()))?;
             let (solid, note) = solid_of(&given, *hull).map_err(|e| format!("{}: {e}", path.display()))?;
             note.into_iter().for_each(|note| context.notes.add(path.display().to_string(), note));
-            Ok(Surface::Mesh { given, solid, slack: 0.0 })
+            // what is closed already may have been wound or welded anew
+            let closed = (*hull || given.clone().check_closed().is_err()).then(|| placed(solid.clone(), &pose));
+            Ok(Form::Mesh { given: placed(if closed.is_some() { given } else { solid }, &pose), closed })
         }
     }
 }
@@ -223,39 +242,35 @@ fn solid_of(given: &TriMesh, hull: bool) -> Result<(TriMesh, Option<String>), Me
     }
 }
 
-/// Returns the spheres in the link's frame and the edits of the text.
+/// Returns the spheres of a link and the edits of the text.
 fn written(
     name: String,
-    parts: &[Part<'_, '_>],
-    shares: &[Share<'_>],
+    nodes: &[Node<'_, '_>],
+    fit: &Fit,
     text: &str,
     edits: &mut Vec<(Range<usize>, String)>,
 ) -> Result<LinkSpheres, String> {
-    let mut link = LinkSpheres { name, shapes: parts.len(), spheres: Vec::new(), outward: Vec::new() };
-    for (part, share) in parts.iter().zip(shares) {
-        let exact = matches!(part.surface, Surface::Sphere(_));
-        let spheres = share.spheres();
-        let placed: Vec<(Vec3, f64)> =
-            spheres.iter().map(|(center, radius, _)| placed(&part.shape.pose, center, *radius, exact)).collect();
-        if !exact {
-            let range = part.node.range();
+    let mut link =
+        LinkSpheres { name, shapes: nodes.len(), spheres: Vec::new(), outward: Vec::new(), coverage: fit.coverage };
+    for (shape, node) in nodes.iter().enumerate() {
+        let own = || fit.spheres.iter().filter(|sphere| sphere.shape == shape);
+        let spheres: Vec<(Vec3, f64)> = own()
+            .map(|s| (s.center, if s.exact { s.radius } else { s.radius + ROUNDING * (s.radius + s.center.norm()) }))
+            .collect();
+        if !own().any(|sphere| sphere.exact) {
+            let range = node.range();
             if text.get(range.clone()).is_none_or(|own| !own.starts_with("<collision")) {
                 return Err(format!(
                     "link \"{}\": a <collision> comes from an entity and cannot be replaced; write it out",
                     link.name
                 ));
             }
-            edits.push((range, elements(&part.node, &placed, text)));
+            edits.push((range, elements(node, &spheres, text)));
         }
-        link.spheres.extend(placed);
-        link.outward.extend(spheres.iter().map(|sphere| sphere.2));
+        link.spheres.extend(spheres);
+        link.outward.extend(own().map(|sphere| sphere.outward));
     }
     Ok(link)
-}
-
-fn placed(pose: &Pose, center: &Vec3, radius: f64, exact: bool) -> (Vec3, f64) {
-    let center = (pose * nalgebra::Point3::from(*center)).coords;
-    (center, if exact { radius } else { radius + ROUNDING * (radius + center.norm()) })
 }
 
 /// Returns one element per sphere, formatted like the original.

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use tumble_core::Object;
 use tumble_core::collide::{Builder, Pose, Shape, TreeCache, TreeSettings, TriMesh, Vec3};
-use tumble_scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfError, UrdfOptions, load, spherize};
+use tumble_scene::urdf::{LinkSpheres, PerLink, SphereOptions, SphereRobot, UrdfError, UrdfOptions, load, spherize};
 
 const ROBOT: &str = r#"<?xml version="1.0"?>
 <!-- a robot of every shape -->
@@ -78,7 +78,14 @@ impl Drop for Folder {
 
 fn options(most: usize) -> SphereOptions {
     let tree = TreeSettings { depth: 4, ..TreeSettings::octree() };
-    SphereOptions { most, error: 1e-3, tree, cache: TreeCache::off(), urdf: UrdfOptions::default() }
+    SphereOptions {
+        most: PerLink::all(most),
+        coverage: PerLink::all(1.0),
+        error: 1e-3,
+        tree,
+        cache: TreeCache::off(),
+        urdf: UrdfOptions::default(),
+    }
 }
 
 /// Returns the pose of an origin: roll, pitch and yaw about fixed axes.
@@ -193,7 +200,6 @@ fn all_else_of_the_file_stays() {
         "<!-- a robot of every shape -->",
         "<visual><geometry><box size=\"1 1 1\"/></geometry></visual>",
         "<!-- keep me -->",
-        "<collision name=\"pad\"><origin xyz=\"0 1 0\"/><geometry><sphere radius=\"0.06\"/></geometry></collision>",
         "<transmission name=\"t\"><actuator name=\"m\"/></transmission>",
         "<material name=\"red\"><color rgba=\"0.8 0.1 0.1 1\"/></material>",
     ] {
@@ -216,21 +222,44 @@ fn all_else_of_the_file_stays() {
     assert_eq!(again.spherize(&options(60)).unwrap().text, text);
 }
 
+/// Returns how far `count` equal spheres on the axis of a capsule extend outside at least, found by
+/// bisection: the spheres cover `2 h` at the ends and the side between `count` centers.
+fn chain(radius: f64, length: f64, count: usize) -> f64 {
+    let covered = |h: f64| 2.0 * h + 2.0 * (count - 1) as f64 * (2.0 * radius * h + h * h).sqrt();
+    let (mut low, mut high) = (0.0, length);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        *(if covered(middle) < length { &mut low } else { &mut high }) = middle;
+    }
+    high
+}
+
+/// A chain from end to end, of radius √(R² + d²/4) at the distance d.
+fn plain_chain(radius: f64, length: f64, count: usize) -> f64 {
+    radius.hypot(0.5 * length / (count - 1) as f64) - radius
+}
+
 #[test]
 fn a_capsule_is_covered_by_formula() {
     let robot = r#"<robot name="r"><link name="l"><collision><geometry><capsule radius="0.1" length="0.6"/></geometry></collision></link></robot>"#;
-    let folder = Folder::new("capsule", robot);
-    for (most, reach) in [(1, 0.3), (2, (0.01_f64 + 0.09).sqrt() - 0.1), (4, (0.01_f64 + 0.01).sqrt() - 0.1)] {
-        let made = folder.spherize(&options(most)).unwrap();
+    let folder = Folder::new("one-capsule", robot);
+    for most in [1, 2, 3, 4, 8, 16, 32] {
+        let reach = chain(0.1, 0.6, most);
+        let made = folder.spherize(&SphereOptions { error: 1e-6, ..options(most) }).unwrap();
         let link = &made.links[0];
         assert_eq!(link.spheres.len(), most);
-        assert!(link.outward.iter().all(|o| (o - reach).abs() < 1e-12), "{:?} {reach}", link.outward);
+        assert!(link.outward.iter().all(|o| (o - reach).abs() < 1e-12), "{most}: {:?} {reach}", link.outward);
         assert!(link.spheres.iter().all(|(c, r)| c.z.abs() <= 0.3 && (r - 0.1 - reach).abs() < 1e-8));
+        assert!(most == 1 || reach < plain_chain(0.1, 0.6, most));
+        for p in points(&TriMesh::capsule(0.1, 0.6, 180, 45), at([0.0; 3], [0.0; 3])) {
+            assert!(link.spheres.iter().any(|(c, r)| (p - c).norm() <= *r), "{most}: {p:?}");
+        }
     }
     // with `error`, it takes as many spheres as that needs
-    let loose = SphereOptions { most: 1000, error: 0.01, ..options(1) };
+    let loose = SphereOptions { error: 0.01, ..options(1000) };
     let link = folder.spherize(&loose).unwrap().links.remove(0);
-    assert!(link.outward.iter().all(|o| *o <= 0.01 * 0.8) && link.spheres.len() < 20, "{}", link.spheres.len());
+    let diagonal = (0.04_f64 + 0.04 + 0.64).sqrt();
+    assert!(link.outward.iter().all(|o| *o <= 0.01 * diagonal) && link.spheres.len() < 20, "{}", link.spheres.len());
 }
 
 #[test]
@@ -297,8 +326,9 @@ fn the_shape_that_is_covered_worst_gets_the_next_sphere() {
         );
         assert!(worst(&rod) < 0.25, "{most}: {rod:?}");
     }
-    let error = folder.spherize(&options(1)).unwrap_err().to_string();
-    assert!(error.contains("link \"l\": it has 2 collision shapes, and each needs a sphere; 1 are allowed"), "{error}");
+    // one sphere covers both
+    let link = folder.spherize(&options(1)).unwrap().links.remove(0);
+    assert_eq!((link.shapes, link.spheres.len()), (2, 1));
 }
 
 #[test]
@@ -311,8 +341,7 @@ fn a_robot_without_masses_is_covered() {
     covered.links.iter().for_each(assert_covered);
 }
 
-/// A cylinder between two spheres, the usual capsule of a link, is covered along its axis: as tightly as by a chain of
-/// as many spheres as are left for it.
+/// A cylinder between two spheres, the usual capsule of a link, is covered as a capsule.
 #[test]
 fn a_cylinder_between_two_spheres_is_covered_as_a_capsule() {
     let (radius, length) = (0.06, 0.27);
@@ -345,13 +374,209 @@ fn a_cylinder_between_two_spheres_is_covered_as_a_capsule() {
         };
         link.spheres.iter().map(reach).fold(0.0, f64::max)
     };
-    for most in [8, 32] {
-        let left = (most - 2) as f64;
-        let chain = radius.hypot(0.5 * length / left) - radius;
+    for most in [4, 8, 16, 32] {
         let (found, smaller) = (worst(radius, most), worst(0.9 * radius, most));
         println!("{most} spheres: {:.2} mm outside; {:.2} mm if the ends are smaller", 1e3 * found, 1e3 * smaller);
-        assert!((found - chain).abs() < 1e-6, "{most}: {found}, {chain}");
+        let wanted = chain(radius, length, most);
+        assert!((found - wanted).abs() < 1e-6, "{most}: {found}, {wanted}");
+        assert!(found < plain_chain(radius, length, most));
         // ends that do not contain those of the cylinder are no capsule
-        assert!(smaller > 2.0 * chain);
+        assert!(smaller > wanted);
+    }
+}
+
+/// Returns the signed distance to a box.
+fn to_box(p: Vec3, center: Vec3, half: Vec3) -> f64 {
+    let q = (p - center).abs() - half;
+    q.sup(&Vec3::zeros()).norm() + q.max().min(0.0)
+}
+
+/// Two boxes that overlap and make a longer one: their inner faces need no sphere, and the outward
+/// error is that to the longer box.
+#[test]
+fn overlapping_boxes_are_covered_as_their_union() {
+    let part = |x: f64| {
+        format!("<collision><origin xyz=\"{x} 0 0\"/><geometry><box size=\"0.6 0.2 0.2\"/></geometry></collision>")
+    };
+    let robot = format!("<robot name=\"r\"><link name=\"l\">{}{}</link></robot>", part(-0.2), part(0.2));
+    let folder = Folder::new("two-boxes", &robot);
+    let whole = Folder::new("one-box", &one_link("<box size=\"1 0.2 0.2\"/>"));
+    let boxes = [Vec3::new(-0.2, 0.0, 0.0), Vec3::new(0.2, 0.0, 0.0)];
+    let half = Vec3::new(0.3, 0.1, 0.1);
+    for most in [1, 3, 8, 20] {
+        let link = folder.spherize(&options(most)).unwrap().links.remove(0);
+        let one = whole.spherize(&options(most)).unwrap().links.remove(0);
+        let worst = |link: &LinkSpheres| link.outward.iter().copied().fold(0.0, f64::max);
+        println!("{most}: {:.2} mm, one box {:.2} mm", 1e3 * worst(&link), 1e3 * worst(&one));
+        assert!(link.spheres.len() <= most && worst(&link) < 1.1 * worst(&one), "{most}");
+        for p in points(&TriMesh::cuboid(Vec3::new(1.0, 0.2, 0.2)), Pose::identity()) {
+            assert!(link.spheres.iter().any(|(c, r)| (p - c).norm() <= *r), "{most}: {p:?}");
+        }
+        // no point of a sphere is further outside than its bound
+        for ((c, r), bound) in link.spheres.iter().zip(&link.outward) {
+            for p in
+                points(&TriMesh::icosphere(*r, 2), Pose::from_parts((*c).into(), nalgebra::UnitQuaternion::identity()))
+            {
+                let outside = boxes.iter().map(|center| to_box(p, *center, half)).fold(f64::INFINITY, f64::min);
+                assert!(outside <= bound + 1e-6, "{most}: {outside} beyond {bound}");
+            }
+        }
+    }
+    // without the overlap, each box alone would need two spheres to reach as little
+    let text = folder.spherize(&options(1)).unwrap().text;
+    assert_eq!(text.matches("<collision").count(), 1, "{text}");
+}
+
+#[test]
+fn less_coverage_is_tighter_and_as_stated() {
+    let folder = Folder::new("coverage", ROBOT);
+    let mut last = 0.0;
+    for coverage in [0.5, 0.8, 0.95, 1.0] {
+        let robot = folder.spherize(&SphereOptions { coverage: PerLink::all(coverage), ..options(8) }).unwrap();
+        let link = &robot.links[0];
+        let worst = link.outward.iter().copied().fold(0.0, f64::max);
+        // even samples of the box, the cylinder and the sphere of the arm, by area
+        let even = |mesh: &TriMesh, pose: Pose| {
+            let split = |t: usize| {
+                let [a, b, c] = mesh.corners(t);
+                let n = 1 + (0.5 * (b - a).cross(&(c - a)).norm() / 2e-6) as usize;
+                (0..n).map(move |k| {
+                    let (u, v) = ((k as f64 * 2f64.sqrt()).fract(), (k as f64 * 3f64.sqrt()).fract());
+                    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                    a + (b - a) * u + (c - a) * v
+                })
+            };
+            (0..mesh.triangles.len())
+                .flat_map(split)
+                .map(|p| (pose * nalgebra::Point3::from(p)).coords)
+                .collect::<Vec<Vec3>>()
+        };
+        let samples = [
+            even(&TriMesh::cuboid(Vec3::new(0.4, 0.2, 0.1)), at([0.1, -0.2, 0.3], [0.3, -0.4, 0.5])),
+            even(&TriMesh::cylinder(0.05, 0.6, 64), at([0.0, 0.0, 1.0], [1.0, 0.0, 0.0])),
+            even(&TriMesh::uv_sphere(0.06 * (1.0 - 1e-9), 32, 16), at([0.0, 1.0, 0.0], [0.0; 3])),
+        ]
+        .concat();
+        let covered = samples.iter().filter(|p| link.spheres.iter().any(|(c, r)| (*p - c).norm() <= *r)).count();
+        let measured = covered as f64 / samples.len() as f64;
+        println!("{coverage}: stated {:.4}, measured {measured:.4}, {:.2} mm outside", link.coverage, 1e3 * worst);
+        assert!(link.coverage >= coverage && measured >= link.coverage - 2e-3, "{coverage}: {measured}");
+        assert!(worst > last, "{coverage}: {worst} after {last}");
+        last = worst;
+    }
+}
+
+#[test]
+fn links_have_numbers_of_their_own() {
+    let folder = Folder::new("numbers", ROBOT);
+    let links = |pairs: &[(&str, usize)]| PerLink {
+        common: 6,
+        links: pairs.iter().map(|(name, most)| ((*name).to_owned(), *most)).collect(),
+    };
+    let robot = folder.spherize(&SphereOptions { most: links(&[("tip", 9)]), ..options(1) }).unwrap();
+    assert_eq!(robot.links.iter().map(|link| link.spheres.len()).collect::<Vec<_>>(), [6, 9]);
+    let refused = |options: SphereOptions| folder.spherize(&options).unwrap_err().to_string();
+    let error = refused(SphereOptions { most: links(&[("hand", 9)]), ..options(1) });
+    assert!(error.contains("there is no link \"hand\" with collision geometry; the links are arm, tip"), "{error}");
+    let error = refused(options(0));
+    assert!(error.contains("0 spheres for a link; expected 1 to 10000"), "{error}");
+    for coverage in [0.0, 1.1, f64::NAN] {
+        let error = refused(SphereOptions { coverage: PerLink::all(coverage), ..options(8) });
+        assert!(error.contains("expected a share above 0 and at most 1"), "{error}");
+    }
+}
+
+/// An arm of three links in a plane and a hand without geometry between: poses by hand.
+const ARM: &str = r#"<robot name="arm">
+<link name="a"><collision><geometry><sphere radius="0.3"/></geometry></collision></link>
+<joint name="ab" type="revolute"><parent link="a"/><child link="b"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<link name="b"><collision><geometry><sphere radius="0.3"/></geometry></collision></link>
+<joint name="bm" type="fixed"><parent link="b"/><child link="m"/><origin xyz="1 0 0"/></joint>
+<link name="m"/>
+<joint name="mc" type="revolute"><parent link="m"/><child link="c"/><axis xyz="0 0 1"/><limit lower="0.5" upper="3" effort="1" velocity="1"/></joint>
+<link name="c"><collision><origin xyz="0.9 0 0"/><geometry><sphere radius="0.3"/></geometry></collision></link>
+<joint name="cd" type="prismatic"><parent link="c"/><child link="d"/><axis xyz="1 0 0"/><limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
+<link name="d"><collision><origin xyz="0.9 0 0.1"/><geometry><sphere radius="0.2"/></geometry></collision></link>
+<joint name="de" type="fixed"><parent link="d"/><child link="e"/></joint>
+<link name="e"><collision><origin xyz="0.9 0 0.2"/><geometry><sphere radius="0.2"/></geometry></collision></link>
+</robot>"#;
+
+#[test]
+fn pairs_that_a_planner_ignores_are_those_by_hand() {
+    let folder = Folder::new("ignored", ARM);
+    let robot = folder.spherize(&options(4)).unwrap();
+    let pose = |pairs: &[(&str, f64)]| pairs.iter().map(|(name, q)| ((*name).to_owned(), *q)).collect();
+    // places by trigonometry: b turns by q, c by p at (2, 0) of b's line, d slides by s along c
+    let by_hand = |q: f64, p: f64, s: f64| {
+        let b = Vec3::new(1.0, 0.0, 0.0);
+        let m = b + Vec3::new(q.cos(), q.sin(), 0.0);
+        let along = Vec3::new((q + p).cos(), (q + p).sin(), 0.0);
+        let (c, d) = (m + 0.9 * along, m + (0.9 + s) * along);
+        let up = Vec3::z();
+        let spheres = [(Vec3::zeros(), 0.3), (b, 0.3), (c, 0.3), (d + 0.1 * up, 0.2), (d + 0.2 * up, 0.2)];
+        let pairs = (0..5).flat_map(|k| (0..k).map(move |j| [j, k]));
+        let depth = |[j, k]: [usize; 2]| spheres[j].1 + spheres[k].1 - (spheres[j].0 - spheres[k].0).norm();
+        let mut found: Vec<([usize; 2], f64)> = pairs.map(|pair| (pair, depth(pair))).filter(|x| x.1 > 0.0).collect();
+        found.sort_by_key(|x| x.0);
+        found
+    };
+    for (q, p, s) in [(0.0, 0.5, 0.0), (1.2, 2.9, 0.05), (2.2, 2.5, 0.1), (-3.0, 3.0, 0.0)] {
+        let found = robot.overlaps(&pose(&[("ab", q), ("mc", p), ("cd", s)])).unwrap();
+        let wanted = by_hand(q, p, s);
+        assert_eq!(found.iter().map(|o| o.links).collect::<Vec<_>>(), wanted.iter().map(|w| w.0).collect::<Vec<_>>());
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!((found.depth - wanted.1).abs() < 1e-9, "{found:?} {wanted:?}");
+            assert_eq!(found.adjacent, found.links[1] == found.links[0] + 1, "{found:?}");
+        }
+    }
+    // by default the zero pose, with the limit next to 0: c, d and e overlap, the others are adjacent
+    let zero = [[0, 1], [1, 2], [2, 3], [2, 4], [3, 4]];
+    let ignored = |free, samples| robot.ignored_pairs(free, samples).unwrap();
+    assert_eq!(ignored(&[], &[]), zero);
+    assert_eq!(robot.overlaps(&pose(&[])).unwrap(), robot.overlaps(&pose(&[("mc", 0.5)])).unwrap());
+    // a pose at which the arm is folded back adds pairs
+    let folded = [pose(&[("ab", 1.2), ("mc", 2.9)])];
+    let mut wanted: Vec<[usize; 2]> = by_hand(1.2, 2.9, 0.0).iter().map(|x| x.0).chain(zero).collect();
+    wanted.sort_unstable();
+    wanted.dedup();
+    assert!(wanted.len() > zero.len());
+    assert_eq!(ignored(&folded, &[]), wanted);
+    // samples add what overlaps at all of them, which the zero pose has already
+    let samples = robot.sample_poses(50, 0);
+    assert_eq!(ignored(&[], &samples), zero);
+    for sample in &samples {
+        assert_eq!(sample.len(), 3);
+        assert!((0.5..=3.0).contains(&sample["mc"]) && (0.0..=0.1).contains(&sample["cd"]), "{sample:?}");
+    }
+    let error = robot.overlaps(&pose(&[("elbow", 1.0)])).unwrap_err();
+    assert!(error.contains("there is no joint \"elbow\" to set; the joints are ab, mc, cd"), "{error}");
+    assert!(robot.overlaps(&pose(&[("ab", f64::NAN)])).unwrap_err().contains("expected a finite number"));
+}
+
+/// End spheres whose centers are not quite at the ends, as with an angle of 1.57 instead of π/2.
+#[test]
+fn an_inexact_capsule_is_a_capsule() {
+    let (radius, length) = (0.05, 0.15);
+    let folder = Folder::new(
+        "inexact",
+        r#"<robot name="r"><link name="l">
+<collision><origin xyz="0 0 0" rpy="1.57 0 0"/><geometry><cylinder radius="0.05" length="0.15"/></geometry></collision>
+<collision><origin xyz="0 -0.075 0"/><geometry><sphere radius="0.05"/></geometry></collision>
+<collision><origin xyz="0 0.075 0"/><geometry><sphere radius="0.05"/></geometry></collision></link></robot>"#,
+    );
+    for most in [1, 2, 8, 32, 80] {
+        let link = folder.spherize(&SphereOptions { error: 1e-7, ..options(most) }).unwrap().links.remove(0);
+        let deviation = 0.075 * (std::f64::consts::FRAC_PI_2 - 1.57);
+        let worst = link.outward.iter().copied().fold(0.0, f64::max);
+        assert!(
+            worst <= chain(radius, length + 2.0 * deviation, most).max(deviation) + 1.01 * deviation,
+            "{most}: {worst}"
+        );
+        let ends = [-0.075, 0.075]
+            .map(|y| points(&TriMesh::icosphere(radius * (1.0 - 1e-12), 4), at([0.0, y, 0.0], [0.0; 3])));
+        let side = points(&TriMesh::cylinder(radius, length, 360), at([0.0; 3], [1.57, 0.0, 0.0]));
+        for p in ends.concat().into_iter().chain(side) {
+            assert!(link.spheres.iter().any(|(c, r)| (p - c).norm() <= *r), "{most}: {p:?}");
+        }
     }
 }

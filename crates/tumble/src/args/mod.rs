@@ -15,8 +15,10 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use tumble::collide::Builder;
 use tumble::render::{DebugDraw, Quality};
-use tumble::scene::urdf::MissingMeshes;
-use values::{folder, fraction, gain, method, missing, package, planner, png, size, wav};
+use tumble::scene::urdf::{JointPositions, MissingMeshes};
+use values::{
+    folder, fraction, gain, joint_positions, method, missing, package, per_link, planner, png, pose_count, size, wav,
+};
 
 /// Real-time dynamics for interactive and immersive environments.
 #[derive(Parser)]
@@ -280,10 +282,23 @@ pub struct SphereTreeOptions {
     /// If a collision mesh is missing: error, or skip it with a note.
     #[arg(long, help_heading = "Robots", value_name = "error|skip", requires = "urdf", default_value = "error", value_parser = missing)]
     pub missing_meshes: MissingMeshes,
-    /// Number of spheres per link, at most, and at least one per collision element. A link gets
-    /// fewer if all stay within --max-error (default 32, or 10000 with --max-error).
-    #[arg(long, help_heading = "Robots", value_name = "N", requires = "urdf", value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub spheres: Option<u32>,
+    /// Number of spheres per link, at most; LINK=N for one link. May be given several times. A link
+    /// gets fewer if all stay within --max-error (default 32, or 10000 with --max-error).
+    #[arg(long, help_heading = "Robots", value_name = "N|LINK=N", requires = "urdf", value_parser = per_link::<usize>)]
+    pub spheres: Vec<(Option<String>, usize)>,
+    /// Share of the outer surface of a link that is covered at least, by area, above 0 and at most 1
+    /// (default); LINK=SHARE for one link. May be given several times. Less is tighter.
+    #[arg(long, help_heading = "Robots", value_name = "SHARE|LINK=SHARE", requires = "urdf", value_parser = per_link::<f64>)]
+    pub coverage: Vec<(Option<String>, f64)>,
+    /// Print the links whose spheres overlap at these positions of joints (rad, m; the others at 0 or
+    /// at the limit next to it); `zero` names none. May be given several times. The pose is taken to
+    /// be free: --planner yaml lists its pairs under self_collision_ignore.
+    #[arg(long = "pose", help_heading = "Robots", value_name = "JOINT=POSITION,...", requires = "urdf", value_parser = joint_positions)]
+    pub poses: Vec<JointPositions>,
+    /// Examine N poses within the limits of the joints, evenly distributed. Pairs of links that
+    /// overlap at all of them go under self_collision_ignore, too.
+    #[arg(long, help_heading = "Robots", value_name = "N", requires = "urdf", default_value_t = 0, value_parser = pose_count)]
+    pub sample_poses: usize,
     /// Also write the spheres for motion planners: yaml (cuRobo) or json (foam, VAMP) beside the
     /// output, or a file that ends in .yml or .json.
     #[arg(long, help_heading = "Robots", value_name = "yaml|json|FILE", requires = "urdf", value_parser = planner)]

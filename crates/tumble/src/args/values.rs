@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use tumble::collide::Builder;
 use tumble::render::{MAX_PIXELS, MAX_SIDE};
 use tumble::scene::Solver;
-use tumble::scene::urdf::MissingMeshes;
+use tumble::scene::urdf::{JointPositions, MAX_POSES, MissingMeshes};
 
 fn number(text: &str, from: f64, to: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -73,6 +73,29 @@ pub(super) fn package(text: &str) -> Result<(String, PathBuf), String> {
     } else {
         Err(format!("there is no folder {folder}"))
     }
+}
+
+/// Parses a number for all links, or `LINK=NUMBER` for one.
+pub(super) fn per_link<T: std::str::FromStr<Err: std::fmt::Display>>(
+    text: &str,
+) -> Result<(Option<String>, T), String> {
+    let (link, number) = text.rsplit_once('=').map_or((None, text), |(link, number)| (Some(link.to_owned()), number));
+    Ok((link, number.trim().parse().map_err(|e| format!("{e}; expected a number, or LINK=NUMBER"))?))
+}
+
+/// Parses `zero` or `JOINT=POSITION,…`.
+pub(super) fn joint_positions(text: &str) -> Result<JointPositions, String> {
+    let one = |word: &str| {
+        let (joint, position) = word.split_once('=').ok_or("expected zero, or JOINT=POSITION,... with rad or m")?;
+        let position = position.trim().parse().map_err(|e| format!("joint {joint}: {e}"))?;
+        Ok((joint.trim().to_owned(), position))
+    };
+    if text.trim() == "zero" { Ok(JointPositions::new()) } else { text.split(',').map(one).collect() }
+}
+
+pub(super) fn pose_count(text: &str) -> Result<usize, String> {
+    let expected = || format!("expected 0 to {MAX_POSES}");
+    text.parse().ok().filter(|count| *count <= MAX_POSES).ok_or_else(expected)
 }
 
 pub(super) fn missing(text: &str) -> Result<MissingMeshes, String> {

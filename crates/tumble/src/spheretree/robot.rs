@@ -9,26 +9,27 @@ use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use tumble::collide::align_columns;
-use tumble::scene::urdf::{LinkSpheres, SphereOptions, SphereRobot, UrdfOptions, spherize as cover};
+use tumble::scene::urdf::{
+    JointPositions, LinkSpheres, Overlap, PerLink, SphereOptions, SphereRobot, UrdfOptions, spherize as cover,
+};
 
 /// Default number of spheres per link, at most.
-const DEFAULT_MAX_SPHERES: u32 = 32;
+const DEFAULT_MAX_SPHERES: usize = 32;
 /// Default number of spheres per link, at most, if `--max-error` is given.
-const MAX_SPHERES_FOR_ERROR: u32 = 10_000;
+const MAX_SPHERES_FOR_ERROR: usize = 10_000;
 /// Default outward error, as a fraction of a shape's diagonal.
 const DEFAULT_MAX_ERROR: f64 = 1e-3;
 
 /// Reads a robot, covers its links with spheres, prints and writes.
 pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
-    let most = options.spheres.unwrap_or(if options.max_error.is_some() {
-        MAX_SPHERES_FOR_ERROR
-    } else {
-        DEFAULT_MAX_SPHERES
-    });
+    let common = if options.max_error.is_some() { MAX_SPHERES_FOR_ERROR } else { DEFAULT_MAX_SPHERES };
+    let most = per_link(&options.spheres, common);
+    let coverage = per_link(&options.coverage, 1.0);
     let error = options.max_error.unwrap_or(DEFAULT_MAX_ERROR);
     let settings = super::settings(options);
     let how = SphereOptions {
-        most: most as usize,
+        most,
+        coverage,
         error,
         tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
         cache: super::cache(options),
@@ -49,20 +50,34 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
     if robot.links.is_empty() {
         return Err(Failure::input(format!("{}: no link has a <collision> element", path.display())));
     }
+    let ignored = Ignored::of(&robot, options).map_err(Failure::input)?;
     if !options.quiet {
         robot.notes.iter().for_each(|note| println!("{note}"));
         print!("{}", table(&robot));
+        print!("{}", ignored.table);
     }
     if let Some(output) = &options.output {
         write_file(output, robot.text.as_bytes())?;
         super::say(options, "robot", output);
     }
     if let Some((output, yaml)) = planner {
-        let text = if yaml { planner_yaml(&robot) } else { planner_json(&robot) };
+        let text = if yaml { planner_yaml(&robot, &ignored.pairs) } else { planner_json(&robot) };
         write_file(&output, text.as_bytes())?;
         super::say(options, "spheres", &output);
     }
     Ok(())
+}
+
+/// Returns the values of an option that may name links.
+fn per_link<T: Copy>(given: &[(Option<String>, T)], common: T) -> PerLink<T> {
+    let mut values = PerLink::all(common);
+    for (link, value) in given {
+        match link {
+            Some(link) => _ = values.links.insert(link.clone(), *value),
+            None => values.common = *value,
+        }
+    }
+    values
 }
 
 /// Returns the file of the planner's list, and whether it is YAML. A bare format names a file
@@ -98,22 +113,77 @@ fn table(robot: &SphereRobot) -> String {
             spheres,
             format!("{:.2}", 1e3 * worst(link)),
             format!("{:.2}", 1e3 * mean(link)),
-            "100.000".into(),
+            format!("{:.3}", 1e5_f64.mul_add(link.coverage, 1e-9).floor() / 1e3),
         ]
     };
     let rows = std::iter::once(heads.map(str::to_owned).to_vec()).chain(robot.links.iter().map(row));
     let total: usize = robot.links.iter().map(|l| l.spheres.len()).sum();
     let mut text = align_columns(rows);
-    _ = writeln!(
-        text,
-        "{total} spheres; 100 % of the collision surface of each link is proved to lie inside the spheres of that link"
-    );
+    let all = robot.links.iter().all(|link| link.coverage >= 1.0);
+    let proved = if all {
+        "100 % of the collision surface of each link is proved to lie inside the spheres of that link"
+    } else {
+        "covered: the share by area of the outer surface of each link that is proved to lie inside the spheres of that link"
+    };
+    _ = writeln!(text, "{total} spheres; {proved}");
     text
 }
 
-/// The format of cuRobo: `collision_spheres`, for each link a list of `center` and `radius`. Names
-/// are quoted, so that none is read as a number.
-fn planner_yaml(robot: &SphereRobot) -> String {
+/// Pairs of links that planners need not compare.
+struct Ignored {
+    pairs: Vec<[usize; 2]>,
+    /// The overlaps at the poses of the options.
+    table: String,
+}
+
+impl Ignored {
+    fn of(robot: &SphereRobot, options: &SphereTreeOptions) -> Result<Ignored, String> {
+        let samples = robot.sample_poses(options.sample_poses, 0);
+        let pairs = robot.ignored_pairs(&options.poses, &samples)?;
+        let mut text = String::new();
+        for (n, pose) in options.poses.iter().enumerate() {
+            let overlaps = robot.overlaps(pose)?;
+            _ = writeln!(text, "pose {}: {} of links overlap", n + 1, pairs_of(overlaps.len()));
+            text += &overlap_table(robot, &overlaps);
+        }
+        if !samples.is_empty() {
+            text += &sample_table(robot, &samples, &pairs)?;
+        }
+        Ok(Ignored { pairs, table: text })
+    }
+}
+
+fn pairs_of(count: usize) -> String {
+    format!("{count} pair{}", if count == 1 { "" } else { "s" })
+}
+
+fn overlap_table(robot: &SphereRobot, overlaps: &[Overlap]) -> String {
+    if overlaps.is_empty() {
+        return String::new();
+    }
+    let row = |overlap: &Overlap| {
+        let [a, b] = overlap.links.map(|link| robot.links[link].name.clone());
+        vec![a, b, format!("{:.2}", 1e3 * overlap.depth), if overlap.adjacent { "yes" } else { "no" }.into()]
+    };
+    let head = ["link", "link", "overlap mm", "adjacent"].map(str::to_owned).to_vec();
+    align_columns(std::iter::once(head).chain(overlaps.iter().map(row)))
+}
+
+/// Returns how many of the sampled poses are free of overlaps other than of ignored pairs.
+fn sample_table(robot: &SphereRobot, samples: &[JointPositions], ignored: &[[usize; 2]]) -> Result<String, String> {
+    let mut colliding = 0;
+    for pose in samples {
+        colliding += usize::from(robot.overlaps(pose)?.iter().any(|overlap| !ignored.contains(&overlap.links)));
+    }
+    let ignored = pairs_of(ignored.len());
+    Ok(format!("{colliding} of {} sampled poses collide, {ignored} of links ignored\n", samples.len()))
+}
+
+/// The format of cuRobo: `collision_spheres`, for each link a list of `center` and `radius`;
+/// `self_collision_ignore`, for a link the later links that are not compared with it;
+/// `self_collision_buffer`, a distance for each link, here 0. Names are quoted, so that none is read
+/// as a number.
+fn planner_yaml(robot: &SphereRobot, ignored: &[[usize; 2]]) -> String {
     let mut text = format!("robot: {}\ncollision_spheres:\n", Value::from(robot.name.as_str()));
     for link in &robot.links {
         _ = writeln!(text, "  {}:", Value::from(link.name.as_str()));
@@ -128,7 +198,20 @@ fn planner_yaml(robot: &SphereRobot) -> String {
             );
         }
     }
-    text
+    let name = |link: usize| Value::from(robot.links[link].name.as_str());
+    let later = |link: usize| {
+        let names: Vec<String> =
+            ignored.iter().filter(|pair| pair[0] == link).map(|pair| name(pair[1]).to_string()).collect();
+        (!names.is_empty()).then(|| format!("  {}: [{}]\n", name(link), names.join(", ")))
+    };
+    let pairs: String = (0..robot.links.len()).filter_map(later).collect();
+    let buffers: String = (0..robot.links.len()).map(|link| format!("  {}: 0.0\n", name(link))).collect();
+    text += &if pairs.is_empty() {
+        "self_collision_ignore: {}\n".into()
+    } else {
+        format!("self_collision_ignore:\n{pairs}")
+    };
+    text + "self_collision_buffer:\n" + &buffers
 }
 
 /// Formats a number with a decimal point, so that YAML does not read it as an integer.

@@ -140,6 +140,11 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&["--urdf", &gone], "--package NAME=DIR"),
         (&["--urdf", &none], "cannot read the URDF"),
         (&["--urdf", &robot, "--planner", "xml"], "expected yaml, json, or a file that ends in .yml, .yaml or .json"),
+        (&["--urdf", &robot, "--spheres", "c=4"], "there is no link \"c\" with collision geometry; the links are a, b"),
+        (&["--urdf", &robot, "--spheres", "b=many"], "expected a number, or LINK=NUMBER"),
+        (&["--urdf", &robot, "--coverage", "0"], "expected a share above 0 and at most 1"),
+        (&["--urdf", &robot, "--pose", "j"], "expected zero, or JOINT=POSITION"),
+        (&["--urdf", &robot, "--pose", "k=1"], "there is no joint \"k\" to set; the joints are j"),
         (&["--urdf", &robot, "--planner", "yaml"], "needs --output, or a file such as --planner robot.yaml"),
     ];
     for (words, said) in cases {
@@ -223,6 +228,10 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
             });
             std::iter::once(format!("  \"{name}\":\n")).chain(rows).collect::<Vec<_>>()
         }))
+        .chain([
+            "self_collision_ignore:\n  \"a\": [\"b\"]\n".to_string(),
+            "self_collision_buffer:\n  \"a\": 0.0\n  \"b\": 0.0\n".to_string(),
+        ])
         .collect();
     assert_eq!(std::fs::read_to_string(yaml).unwrap(), wanted);
     // the corners of the box are inside: 0.1 across, 0 and 1 along
@@ -234,4 +243,36 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
         };
         assert!(a.iter().any(|s| gap(s) <= 0.0), "{p:?}");
     }
+}
+
+#[test]
+fn counts_coverage_and_self_collision_are_said() {
+    let folder = Folder::new("spheretree-planner");
+    let robot = folder.write("robot.urdf", ROBOT);
+    let said = succeed(&[
+        "spheretree",
+        "--no-cache",
+        "--urdf",
+        &robot,
+        "--spheres",
+        "6",
+        "--spheres",
+        "a=3",
+        "--coverage",
+        "a=0.8",
+        "--pose",
+        "j=1",
+        "--sample-poses",
+        "20",
+    ]);
+    let row = |link: &str| {
+        let line = said.lines().find(|line| line.starts_with(&format!("{link} "))).unwrap();
+        line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(row("a")[2], "3", "{said}");
+    let covered: f64 = row("a")[5].parse().unwrap();
+    assert!((80.0..100.0).contains(&covered) && row("b")[5] == "100.000", "{said}");
+    assert!(said.contains("4 spheres; covered: the share by area"), "{said}");
+    assert!(said.contains("pose 1: 1 pair of links overlap") && said.contains("adjacent"), "{said}");
+    assert!(said.contains("0 of 20 sampled poses collide, 1 pair of links ignored"), "{said}");
 }
