@@ -50,8 +50,8 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "a324bc50eab8fdec", "5ba2a1c2fde17086";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "682a692bbe809d5e";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5b3b4039f014f3be";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "80e95da1168215c7";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "172fe9b2361d84a5";
     chain_time_stepping: "chain", TimeStepping, "f47e2b35690a2684", "ee8524465209ed50";
     chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
     falling_time_stepping: "falling", TimeStepping, "be3988048208f897", "f93c0dd439b1b701";

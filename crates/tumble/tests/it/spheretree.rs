@@ -120,7 +120,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let (nowhere, here) = (text(&folder.path("nowhere/tree.json")), text(&folder.path("")));
     let bare = folder.write("bare.urdf", "<robot name=\"r\"><link name=\"a\"/></robot>");
     let gone = folder.write("gone.urdf", GONE);
-    let cases: [(&[&str], &str); 17] = [
+    let cases: [(&[&str], &str); 22] = [
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
@@ -266,7 +266,7 @@ fn counts_coverage_and_self_collision_are_said() {
         "20",
     ]);
     let row = |link: &str| {
-        let line = said.lines().find(|line| line.starts_with(&format!("{link} "))).unwrap();
+        let line = said.lines().find(|line| line.trim_start().starts_with(&format!("{link} "))).unwrap();
         line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(row("a")[2], "3", "{said}");
