@@ -68,6 +68,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::shapes::{Block, Capsule, Compound, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere};
     #[pymodule_export]
+    use super::objects::sphere_robot::SphereRobot;
+    #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
     use super::objects::terrain::{ConvexHull, HeightField, Sdf, Terrain};

@@ -105,3 +105,53 @@ def test_what_is_no_closed_mesh_is_refused(tmp_path):
     (tmp_path / "tree.json").write_text('{"format": "something else"}')
     with pytest.raises(tumble.InvalidValueError, match="tree.json"):
         tumble.SphereTree.load(tmp_path / "tree.json")
+
+
+ROBOT = """<robot name="two"><link name="a"><collision><origin xyz="0 0 0.5"/><geometry><box size="0.2 0.2 1"/></geometry></collision></link>
+<joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/><limit lower="0" upper="2" effort="1" velocity="1"/></joint>
+<link name="b"><collision><geometry><sphere radius="0.25"/></geometry></collision></link></robot>"""
+
+
+def test_links_of_a_robot_are_covered_by_spheres(tmp_path):
+    file = tmp_path / "two.urdf"
+    file.write_text(ROBOT)
+    robot = tumble.SphereRobot.from_urdf(file, spheres=12, spheres_of={"a": 20}, cache=False)
+    assert robot.name == "two" and list(robot.links) == ["a", "b"] and robot.notes == []
+    a, b = robot.links["a"], robot.links["b"]
+    assert np.array_equal(b.centers, [[0, 0, 0]]) and b.radii == [0.25] and b.outward == [0]
+    assert a.coverage == 1 and a.shapes == 1 and 12 < len(a.radii) <= 20 == robot.urdf.count("<sphere") - 1
+    # points of the box's surface lie in a sphere, and no sphere reaches further out than it says
+    points = np.random.default_rng(1).uniform(-1, 1, (2000, 3))
+    points[np.arange(2000), np.abs(points).argmax(axis=1)] = np.sign(points[np.arange(2000), np.abs(points).argmax(axis=1)])
+    points = points * [0.1, 0.1, 0.5] + [0, 0, 0.5]
+    assert (np.linalg.norm(points[:, None] - a.centers, axis=2) - a.radii).min(axis=1).max() <= 0
+    beyond = np.abs(a.centers - [0, 0, 0.5]) - [0.1, 0.1, 0.5]
+    assert ((beyond + a.radii[:, None]).max(axis=1) <= a.outward + 1e-12).all()
+    # the sphere leaves the box at 0.35, and their spheres no later than by what those of the box reach out
+    assert [pair[:2] + pair[3:] for pair in robot.overlaps()] == [("a", "b", True)]
+    assert robot.overlaps({"j": 0.36 + a.outward.max()}) == []
+    assert robot.ignored_pairs(sample_poses=10) == [("a", "b")]
+    loose = tumble.SphereRobot.from_urdf(file, spheres=12, coverage_of={"a": 0.8}, cache=False).links["a"]
+    assert 0.8 <= loose.coverage < 1 and loose.outward.max() < a.outward.max()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"spheres": 0}, "0 spheres for a link; expected 1 to 10000"),
+        ({"spheres_of": {"c": 3}}, 'no link "c" with collision geometry; the links are a, b'),
+        ({"coverage": 1.5}, "a coverage of 1.5"),
+        ({"max_error": 0.0}, "max_error is 0"),
+    ],
+)
+def test_wrong_words_for_a_robot_of_spheres_are_named(tmp_path, words, said):
+    (tmp_path / "two.urdf").write_text(ROBOT)
+    with pytest.raises(ValueError, match=said):
+        tumble.SphereRobot.from_urdf(tmp_path / "two.urdf", cache=False, **words)
+
+
+def test_a_joint_that_does_not_exist_is_named(tmp_path):
+    (tmp_path / "two.urdf").write_text(ROBOT)
+    robot = tumble.SphereRobot.from_urdf(tmp_path / "two.urdf", cache=False)
+    with pytest.raises(tumble.InvalidValueError, match='no joint "k" to set; the joints are j'):
+        robot.overlaps({"k": 1.0})

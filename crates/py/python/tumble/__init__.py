@@ -56,6 +56,7 @@ from tumble._native import (
     Shape,
     Soundtrack,
     Sphere,
+    SphereRobot,
     SphereTree,
     SpringMesh,
     StepReport,
@@ -69,7 +70,7 @@ from tumble._native import (
 )
 from tumble._pictures import Camera, save_png
 from tumble._recordings import Recording, read, replay
-from tumble._values import Energy, Event, Firing, IntersectPart, Momentum, SphereLevel
+from tumble._values import Energy, Event, Firing, IntersectPart, LinkSpheres, Momentum, SphereLevel
 from tumble._window import Window
 
 Plane = HalfSpace
@@ -108,6 +109,7 @@ __all__ = [
     "InvalidValueError",
     "Joint",
     "LinearizedStep",
+    "LinkSpheres",
     "Mesh",
     "Mimic",
     "MissingFileError",
@@ -132,6 +134,7 @@ __all__ = [
     "Soundtrack",
     "Sphere",
     "SphereLevel",
+    "SphereRobot",
     "SphereTree",
     "SpringMesh",
     "StepError",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
 from tumble._extension import Behavior, Force, Intersect
-from tumble._values import Energy, Event, Firing, Momentum, SphereLevel
+from tumble._values import Energy, Event, Firing, LinkSpheres, Momentum, SphereLevel
 from tumble._window import Window
 from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, SensorKind, Solver, Stepper, TreeMethod
 
@@ -61,6 +61,7 @@ __all__ = [
     "Shape",
     "Soundtrack",
     "Sphere",
+    "SphereRobot",
     "SphereTree",
     "SpringMesh",
     "StepReport",
@@ -1591,6 +1592,69 @@ class StepReport:
     @property
     def unreachable_distance(self) -> float:
         """Gap of that joint, meters."""
+
+@final
+class SphereRobot:
+    """A robot whose links are covered by spheres, as motion planners use them: that of
+    ``tumble spheretree --urdf``.
+
+    Made by ``SphereRobot.from_urdf``.
+    """
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        *,
+        spheres: int | None = None,
+        spheres_of: Mapping[str, int] | None = None,
+        coverage: float = 1.0,
+        coverage_of: Mapping[str, float] | None = None,
+        max_error: float | None = None,
+        packages: Mapping[str, _Path] | None = None,
+        missing_meshes: MissingMeshes = "error",
+        method: TreeMethod = "medial",
+        cache: bool = True,
+    ) -> SphereRobot:
+        """Reads a URDF and covers the outer surface of the collision shapes of each link by spheres.
+
+        spheres: largest number of spheres of a link, 1 to 10,000 (default 32, with max_error 10,000);
+        spheres_of: that of links by name. coverage: share of the outer surface of a link, by area, that is
+        covered at least, above 0 and at most 1; coverage_of: that of links by name. max_error: spheres that
+        reach at most this far outside are not divided, as a fraction of the link's diagonal (default 0.001).
+        packages: folders by name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``. method:
+        the sphere trees that are tried, as in ``SphereTree.build``. cache: whether trees are kept on disk.
+
+        Names of links that do not exist, numbers out of range, and files that cannot be read raise
+        ``InvalidValueError``, ``UnreadableFileError`` or ``SceneError`` with the reason. The interpreter is released meanwhile;
+        Ctrl-C ends the work.
+        """
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+    @property
+    def urdf(self) -> str:
+        """The URDF with spheres as collision geometry, a text. All else in it is that of the file."""
+    @property
+    def notes(self) -> list[str]:
+        """Notes about the file and its meshes."""
+    @property
+    def links(self) -> dict[str, LinkSpheres]:
+        """The spheres by the name of the link, in the order of the file: each a ``LinkSpheres``."""
+    def overlaps(self, positions: Mapping[str, float] | None = None) -> list[tuple[str, str, float, bool]]:
+        """Returns the pairs of links whose spheres overlap: two names, the depth in meters, and whether the
+        links are adjacent.
+
+        positions: positions of joints by name, rad or m; others are at 0, or at the limit next to it. A name
+        that is no joint with one degree of freedom raises ``InvalidValueError``.
+        """
+    def ignored_pairs(
+        self, poses: Sequence[Mapping[str, float]] | None = None, sample_poses: int = 0
+    ) -> list[tuple[str, str]]:
+        """Returns the pairs of links that a planner need not compare: adjacent ones, those that overlap at one
+        of ``poses``, which are taken to be free (without any at the zero pose), and those that overlap at all
+        of ``sample_poses`` poses, which are evenly distributed within the limits.
+
+        poses: dicts as in ``overlaps``, at most 1,000,000 with the samples.
+        """
 
 @final
 class SphereTree:

@@ -93,6 +93,21 @@ class IntersectPart(NamedTuple):
     """Its shape in its frame."""
 
 
+class LinkSpheres(NamedTuple):
+    """The spheres of a link of a :class:`SphereRobot`, in the axes of the link."""
+
+    centers: NDArray[np.float64]
+    """Centers, shape (n, 3), m."""
+    radii: NDArray[np.float64]
+    """Radii, shape (n,), m."""
+    outward: NDArray[np.float64]
+    """Upper bounds of the distances by which they reach outside the shapes of the link, shape (n,), m."""
+    coverage: float
+    """Share of the outer surface, by area, that is proved to lie inside."""
+    shapes: int
+    """Number of collision elements that the link had."""
+
+
 class SphereLevel(NamedTuple):
     """The spheres of one level of a :class:`SphereTree`, in the axes of its mesh."""
 

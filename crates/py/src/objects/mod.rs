@@ -18,5 +18,6 @@ pub mod robot;
 pub mod sensor;
 pub mod shape_material;
 pub mod shapes;
+pub mod sphere_robot;
 pub mod spheretree;
 pub mod terrain;

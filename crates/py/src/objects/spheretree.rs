@@ -76,19 +76,18 @@ impl SphereTree {
 }
 
 /// Returns the default settings of the method with the given overrides.
-fn settings(method: &str, branching: Option<u32>, depth: Option<u32>, max_error: Option<f64>) -> Result<TreeSettings> {
-    let builder = meaning("method", method, BUILDERS)?;
+pub fn settings(builder: Builder, branching: Option<u32>, depth: Option<u32>, max_error: Option<f64>) -> TreeSettings {
     let usual = if builder == Builder::Octree {
         TreeSettings::octree()
     } else {
         TreeSettings { builder, ..TreeSettings::default() }
     };
-    Ok(TreeSettings {
+    TreeSettings {
         branch: branching.unwrap_or(usual.branch),
         depth: depth.unwrap_or(usual.depth),
         error: max_error.unwrap_or(usual.error),
         ..usual
-    })
+    }
 }
 
 /// Returns the name of the mesh in the tree's file.
@@ -127,7 +126,7 @@ impl SphereTree {
         max_error: Option<f64>,
         cache: bool,
     ) -> Result<SphereTree> {
-        let settings = settings(method, branching, depth, max_error)?;
+        let settings = settings(meaning("method", method, BUILDERS)?, branching, depth, max_error);
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };
         abandonable(py, move |stop| {

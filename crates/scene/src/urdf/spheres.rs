@@ -19,7 +19,7 @@ use roxmltree::Node;
 use tumble_core::collide::{MeshError, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use super::error::UrdfError;
-use super::fit::{Fit, Form, fit, placed};
+use super::fit::{Fit, FittedSphere, Form, fit, placed};
 use super::link::{Context, read_shape};
 use super::options::UrdfOptions;
 use super::read::{Content, read_text, text_of};
@@ -254,9 +254,8 @@ fn written(
         LinkSpheres { name, shapes: nodes.len(), spheres: Vec::new(), outward: Vec::new(), coverage: fit.coverage };
     for (shape, node) in nodes.iter().enumerate() {
         let own = || fit.spheres.iter().filter(|sphere| sphere.shape == shape);
-        let spheres: Vec<(Vec3, f64)> = own()
-            .map(|s| (s.center, if s.exact { s.radius } else { s.radius + ROUNDING * (s.radius + s.center.norm()) }))
-            .collect();
+        let more = |s: &FittedSphere| if s.exact { 0.0 } else { ROUNDING * (s.radius + s.center.norm()) };
+        let spheres: Vec<(Vec3, f64)> = own().map(|s| (s.center, s.radius + more(s))).collect();
         if !own().any(|sphere| sphere.exact) {
             let range = node.range();
             if text.get(range.clone()).is_none_or(|own| !own.starts_with("<collision")) {
@@ -268,7 +267,7 @@ fn written(
             edits.push((range, elements(node, &spheres, text)));
         }
         link.spheres.extend(spheres);
-        link.outward.extend(own().map(|sphere| sphere.outward));
+        link.outward.extend(own().map(|sphere| sphere.outward + more(sphere)));
     }
     Ok(link)
 }
