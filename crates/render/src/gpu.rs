@@ -4,6 +4,7 @@ mod cull;
 mod data;
 mod finish;
 mod frame;
+mod kept;
 mod meshes;
 mod particles;
 mod pipeline_plan;
@@ -72,6 +73,8 @@ pub(crate) struct Gpu {
     opengl: bool,
     /// Whether hidden spheres are culled on the CPU, as for software drivers.
     choosy: bool,
+    /// Whether fragment stages take the numbers of uniforms as inputs, as for software drivers.
+    flat_inputs: bool,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -109,7 +112,7 @@ impl Renderer {
     /// Prepares an adapter.
     fn on(adapter: wgpu::Adapter) -> Result<Self, RenderError> {
         let gpu = pollster::block_on(Gpu::open(adapter))?;
-        let pipelines = Pipelines::new(&gpu.device, !gpu.opengl);
+        let pipelines = Pipelines::new(&gpu.device, !gpu.opengl, gpu.flat_inputs);
         let finisher = Finisher::new(&gpu);
         let textures = TextureCache::new(&gpu, &pipelines.texture_layout);
         gpu.complaint()?;
@@ -382,6 +385,12 @@ impl Gpu {
             return Err(RenderError::Device { adapter: name, reason: format!("it has no {lacking}") });
         }
         let opengl = info.backend == wgpu::Backend::Gl;
+        let choosy = info.device_type == wgpu::DeviceType::Cpu;
+        let inputs = adapter.limits().max_inter_stage_shader_variables;
+        let flat_inputs = choosy && !opengl && inputs >= kept::INPUTS;
+        if flat_inputs {
+            limits.max_inter_stage_shader_variables = inputs;
+        }
         let asked = adapter
             .request_device(&wgpu::DeviceDescriptor {
                 label: Some("tumble"),
@@ -404,15 +413,7 @@ impl Gpu {
                 .unwrap_or_else(PoisonError::into_inner)
                 .get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu {
-            device: asked.0,
-            queue: asked.1,
-            adapter: name,
-            opengl,
-            choosy: info.device_type == wgpu::DeviceType::Cpu,
-            complaint,
-            lost,
-        })
+        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, choosy, flat_inputs, complaint, lost })
     }
 
     /// Returns the first device error since the last call.

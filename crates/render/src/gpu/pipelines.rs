@@ -2,6 +2,7 @@
 //! pipelines when a picture first needs them. There is one for each pass, pattern and quality, so
 //! that none computes what it does not show.
 
+use super::kept::{KEPT_LIGHTS, Part, with_flat_inputs};
 use super::pipeline_plan::{ALWAYS, Input, Plan, TEST, TEST_BEHIND, WHERE_ANY, WRITE, WRITE_BEHIND};
 use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
@@ -23,20 +24,26 @@ pub const ID: TextureFormat = TextureFormat::R32Uint;
 const NUMBERS: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 
 /// Everything except the edges of spheres.
-pub(super) const PICTURE_WGSL: &str = concat!(
-    include_str!("../shaders/variant.wgsl"),
-    include_str!("../shaders/view.wgsl"),
-    include_str!("../shaders/noise.wgsl"),
-    include_str!("../shaders/pattern.wgsl"),
-    include_str!("../shaders/light.wgsl"),
-    include_str!("../shaders/surface.wgsl"),
-    include_str!("../shaders/mesh.wgsl"),
-    include_str!("../shaders/sphere.wgsl"),
-    include_str!("../shaders/soft.wgsl"),
-    include_str!("../shaders/capsule.wgsl"),
-    include_str!("../shaders/line.wgsl"),
-    include_str!("../shaders/sky.wgsl"),
-);
+const PICTURE_PARTS: [Part; 12] = [
+    Part::Vertex(include_str!("../shaders/variant.wgsl")),
+    Part::Fragment(include_str!("../shaders/view.wgsl")),
+    Part::Vertex(include_str!("../shaders/noise.wgsl")),
+    Part::Vertex(include_str!("../shaders/pattern.wgsl")),
+    Part::Fragment(include_str!("../shaders/light.wgsl")),
+    Part::Vertex(include_str!("../shaders/surface.wgsl")),
+    Part::Vertex(include_str!("../shaders/mesh.wgsl")),
+    Part::Vertex(include_str!("../shaders/sphere.wgsl")),
+    Part::Fragment(include_str!("../shaders/soft.wgsl")),
+    Part::Vertex(include_str!("../shaders/capsule.wgsl")),
+    Part::Vertex(include_str!("../shaders/line.wgsl")),
+    Part::Fragment(include_str!("../shaders/sky.wgsl")),
+];
+
+/// The shaders of pictures, except the edges of spheres.
+pub(super) fn picture_wgsl() -> String {
+    PICTURE_PARTS.map(Part::text).concat()
+}
+
 pub(super) const EDGE_SAMPLES_WGSL: &str = include_str!("../shaders/edge_samples.wgsl");
 pub(super) const EDGE_PIXELS_WGSL: &str = include_str!("../shaders/edge_pixels.wgsl");
 const OCCLUSION_WGSL: &str = concat!(include_str!("../shaders/view.wgsl"), include_str!("../shaders/occlusion.wgsl"));
@@ -65,6 +72,8 @@ pub struct Variant {
     reflections: bool,
     /// Whether the only light is directional; set only with the cheap approximation of light.
     one_sun: bool,
+    /// Number of lights, or 4 if there are more than three.
+    lights: u32,
 }
 
 impl Variant {
@@ -78,6 +87,7 @@ impl Variant {
             softbox: list.sky.softbox > 0.0 && reflections,
             reflections,
             one_sun,
+            lights: list.lights.len().min(KEPT_LIGHTS + 1) as u32,
         }
     }
 
@@ -124,15 +134,14 @@ pub struct Pipelines {
 }
 
 impl Pipelines {
-    /// `sample_masks`: whether shaders can write which samples of a pixel they cover.
-    pub fn new(device: &Device, sample_masks: bool) -> Self {
+    /// `sample_masks`: whether shaders can write which samples of a pixel they cover; `flat_inputs`: whether
+    /// their fragment stages take the numbers of uniforms as inputs.
+    pub fn new(device: &Device, sample_masks: bool, flat_inputs: bool) -> Self {
         // OpenGL has no interpolation without perspective; in the shaders that use it w is 1, so
         // the result is the same
-        let common = if sample_masks {
-            PICTURE_WGSL.to_owned()
-        } else {
-            PICTURE_WGSL.replace("@interpolate(linear)", "@interpolate(perspective)")
-        };
+        let common = if flat_inputs { with_flat_inputs(&PICTURE_PARTS) } else { picture_wgsl() };
+        let common =
+            if sample_masks { common } else { common.replace("@interpolate(linear)", "@interpolate(perspective)") };
         let view_layout = layout(device, "view", &[uniform(0)]);
         let scene_layout = layout(
             device,
@@ -206,14 +215,14 @@ impl Pipelines {
                 depth(mesh, None, Input::Mesh, None, WRITE),
                 depth("vs_bounds", Some("fs_bounds_depth"), Input::SphereBounds, None, WRITE),
                 depth("vs_near", Some("fs_near_depth"), Input::SphereBounds, None, WRITE),
-                depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
+                depth("vs_capsule_depth", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
             ],
             ids: [
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
                 depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
                 depth("vs_bounds", Some("fs_bounds_id"), Input::SphereBounds, Some(ID), WRITE),
                 depth("vs_near", Some("fs_near_id"), Input::SphereBounds, Some(ID), WRITE),
-                depth("vs_capsule", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
+                depth("vs_capsule_depth", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
             ],
             mesh_first: mesh_first.build(device, &pixels, &picture),
             occlusion: whole("fs_occlusion"),
@@ -288,7 +297,7 @@ pub(super) fn plan<'a>(pass: Pass, variant: Variant, constants: &'a [(&'a str, f
 }
 
 /// Returns the constants of the shaders for a surface.
-pub(super) fn constants(surface: u32, variant: Variant) -> [(&'static str, f64); 8] {
+pub(super) fn constants(surface: u32, variant: Variant) -> [(&'static str, f64); 9] {
     let flag = |on: bool| f64::from(u8::from(on));
     [
         ("SURFACE", f64::from(surface % 1000)),
@@ -299,6 +308,7 @@ pub(super) fn constants(surface: u32, variant: Variant) -> [(&'static str, f64);
         ("SOFTBOX", flag(variant.softbox)),
         ("REFLECTIONS", flag(variant.reflections)),
         ("ONE_SUN", flag(variant.one_sun)),
+        ("LIGHTS", f64::from(variant.lights)),
     ]
 }
 

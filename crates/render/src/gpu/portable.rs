@@ -165,7 +165,7 @@ impl PortableKey {
             Kind::MeshDepth => depth("vs_mesh_depth", None, Input::Mesh),
             Kind::SphereDepth => depth("vs_bounds", Some("fs_bounds_depth"), Input::SphereBounds),
             Kind::NearSphereDepth => depth("vs_near", Some("fs_near_depth"), Input::SphereBounds),
-            Kind::CapsuleDepth => depth("vs_capsule", Some("fs_capsule_depth"), Input::Capsule),
+            Kind::CapsuleDepth => depth("vs_capsule_depth", Some("fs_capsule_depth"), Input::Capsule),
             // with the plans of several samples, nothing depends on a pass before
             Kind::Picture(Pass::Sphere, _, variant) => {
                 let plan = pipelines::plan(Pass::Sphere, variant.with_samples(4), constants);

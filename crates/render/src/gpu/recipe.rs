@@ -3,7 +3,7 @@
 
 use super::finish::FINISH_WGSL;
 use super::pipeline_plan::{Input, Plan};
-use super::pipelines::{EDGE_PIXELS_WGSL, EDGE_SAMPLES_WGSL, PICTURE_WGSL};
+use super::pipelines::{EDGE_PIXELS_WGSL, EDGE_SAMPLES_WGSL, picture_wgsl};
 use super::portable::PortableKey;
 use crate::RenderError;
 use std::collections::BTreeMap;
@@ -103,7 +103,7 @@ impl PortableKey {
 }
 
 /// Entry points of programs.
-const ENTRIES: [&str; 22] = [
+const ENTRIES: [&str; 23] = [
     "vs_sky",
     "fs_sky",
     "vs_ground",
@@ -113,6 +113,7 @@ const ENTRIES: [&str; 22] = [
     "vs_shell",
     "fs_sphere",
     "vs_capsule",
+    "vs_capsule_depth",
     "fs_capsule",
     "fs_shell",
     "vs_soft",
@@ -130,7 +131,7 @@ const ENTRIES: [&str; 22] = [
 
 /// The shaders of all programs for WebGPU. With one sample per pixel, edges of spheres are whole pixels.
 pub fn portable_wgsl(samples: u32) -> String {
-    [PICTURE_WGSL, if samples > 1 { EDGE_SAMPLES_WGSL } else { EDGE_PIXELS_WGSL }].concat()
+    picture_wgsl() + if samples > 1 { EDGE_SAMPLES_WGSL } else { EDGE_PIXELS_WGSL }
 }
 
 /// The shader of the passes of a [`PortableFacet`](crate::PortableFacet) for WebGPU: the entry points

@@ -22,6 +22,7 @@ struct CapsuleOut {
     @location(3) @interpolate(flat) other_metal: vec4f,
     @location(4) @interpolate(flat) pattern: vec4f,
     @location(5) @interpolate(flat) axis: vec4f, // a, h
+    //KEPT 6
 };
 
 fn turned(q: vec4f, v: vec3f) -> vec3f {
@@ -32,7 +33,10 @@ fn turned(q: vec4f, v: vec3f) -> vec3f {
 // Corners of a cube's sides as a strip of triangles that face outward.
 const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u, 5u);
 
-@vertex fn vs_capsule(in: CapsuleIn, @builtin(vertex_index) index: u32) -> CapsuleOut {
+// A corner of the box, and the axis of the capsule.
+struct CapsuleCorner { clip: vec4f, axis: vec4f };
+
+fn capsule_corner(in: CapsuleIn, index: u32) -> CapsuleCorner {
     var strip = STRIP;
     let k = strip[index];
     let corner = vec3f(select(-1.0, 1.0, (k & 1u) != 0u), select(-1.0, 1.0, (k & 2u) != 0u), select(-1.0, 1.0, (k & 4u) != 0u));
@@ -41,7 +45,23 @@ const STRIP = array<u32, 14>(6u, 7u, 2u, 3u, 1u, 7u, 5u, 6u, 4u, 2u, 0u, 1u, 4u,
     var clip = view.clip_from_world * vec4f(at, 1.0);
     // far sides beyond the far plane are drawn on it
     clip.z = max(clip.z, 0.0);
-    return CapsuleOut(clip, in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
+    return CapsuleCorner(clip, vec4f(turned(in.turn, vec3f(0.0, 0.0, 1.0)), in.half_length.x));
+}
+
+@vertex fn vs_capsule(in: CapsuleIn, @builtin(vertex_index) index: u32) -> CapsuleOut {
+    let c = capsule_corner(in, index);
+    return CapsuleOut(c.clip, in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern, c.axis /*KEPT*/);
+}
+
+struct CapsuleDepthOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) sphere: vec4f,
+    @location(1) @interpolate(flat) axis: vec4f,
+};
+
+@vertex fn vs_capsule_depth(in: CapsuleIn, @builtin(vertex_index) index: u32) -> CapsuleDepthOut {
+    let c = capsule_corner(in, index);
+    return CapsuleDepthOut(c.clip, in.sphere, c.axis);
 }
 
 // The ray, its parameter nearest to the middle, the vector from there to the middle, and the
@@ -92,7 +112,7 @@ fn hit_capsule(sphere: vec4f, axis: vec4f, pixel: vec2f) -> Hit {
     return Hit(p.nearest + t, sphere.xyz + u * a + n * sphere.w, n, -normalize(d));
 }
 
-fn capsule_depth(in: CapsuleOut) -> f32 {
+fn capsule_depth(in: CapsuleDepthOut) -> f32 {
     let p = inside_capsule(in.sphere, in.axis, in.clip.xy);
     let h = hit_capsule(in.sphere, in.axis, in.clip.xy);
     let depth = depth_of(h.s);
@@ -100,16 +120,19 @@ fn capsule_depth(in: CapsuleOut) -> f32 {
     return depth;
 }
 
-@fragment fn fs_capsule_depth(in: CapsuleOut) -> @builtin(frag_depth) f32 {
+@fragment fn fs_capsule_depth(in: CapsuleDepthOut) -> @builtin(frag_depth) f32 {
+    //TAKE view
     return capsule_depth(in);
 }
 
 // The index of the nearest sphere: none.
-@fragment fn fs_capsule_no_id(in: CapsuleOut) -> BoundsPixel {
+@fragment fn fs_capsule_no_id(in: CapsuleDepthOut) -> BoundsPixel {
+    //TAKE view
     return BoundsPixel(0u, capsule_depth(in));
 }
 
 @fragment fn fs_capsule(in: CapsuleOut) -> SpherePixel {
+    //TAKE
     let pixel = in.clip.xy;
     let mask = capsule_mask(in.sphere, in.axis, pixel);
     let h = hit_capsule(in.sphere, in.axis, pixel);

@@ -209,6 +209,19 @@ fn lit_simply(s: Surface, m: Simple, l: vec3f, light: Light) -> vec3f {
     return (m.diffuse + m.f0 * lobe) * light.color.xyz * n_l;
 }
 
+// A lamp or a distant light.
+fn lit_simply_by(s: Surface, m: Simple, given: Light) -> vec3f {
+    var light = given;
+    var l = light.at.xyz;
+    if (light.at.w > 0.5) {
+        let d = light.at.xyz - s.position;
+        let near = inverseSqrt(max(dot(d, d), 1e-6));
+        l = d * near;
+        light.color = vec4f(light.color.xyz * (near * near), light.color.w);
+    }
+    return lit_simply(s, m, l, light);
+}
+
 fn shade_simply(s: Surface) -> vec3f {
     let n = s.normal;
     let v = s.to_eye;
@@ -224,16 +237,11 @@ fn shade_simply(s: Surface) -> vec3f {
     if (ONE_SUN) {
         out = lit_simply(s, simple, scene.lights[0].at.xyz, scene.lights[0]);
     } else {
-        for (var i = 0u; i < u32(scene.zenith.w); i++) {
-            var light = scene.lights[i];
-            var l = light.at.xyz;
-            if (light.at.w > 0.5) {
-                let d = light.at.xyz - s.position;
-                let near = inverseSqrt(max(dot(d, d), 1e-6));
-                l = d * near;
-                light.color = vec4f(light.color.xyz * (near * near), light.color.w);
-            }
-            out += lit_simply(s, simple, l, light);
+        if (LIGHTS > 0u) { out += lit_simply_by(s, simple, scene.lights[0]); }
+        if (LIGHTS > 1u) { out += lit_simply_by(s, simple, scene.lights[1]); }
+        if (LIGHTS > 2u) { out += lit_simply_by(s, simple, scene.lights[2]); }
+        if (LIGHTS > 3u) {
+            for (var i = 3u; i < u32(scene.zenith.w); i++) { out += lit_simply_by(s, simple, scene.lights[i]); }
         }
     }
     var open = 1.0;

@@ -16,17 +16,16 @@ struct MeshIn {
 // rest and returns that factor.
 struct MeshOut {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) @interpolate(perspective, centroid) offset: vec3f,
+    @location(0) @interpolate(perspective, centroid) offset_one: vec4f,
     @location(1) @interpolate(perspective, centroid) normal: vec3f,
     @location(2) @interpolate(perspective, centroid) object: vec3f,
     @location(3) @interpolate(perspective, centroid) object_normal: vec3f,
     @location(4) @interpolate(flat) color_rough: vec4f,
     @location(5) @interpolate(flat) other_metal: vec4f,
     @location(6) @interpolate(flat) pattern: vec4f,
-    @location(7) @interpolate(flat) side: f32,
+    @location(7) @interpolate(flat) origin_side: vec4f,
     @location(8) @interpolate(perspective, centroid) place: vec3f,
-    @location(9) @interpolate(flat) origin: vec3f,
-    @location(10) @interpolate(perspective, centroid) one: f32,
+    //KEPT 9
 };
 
 fn world_of(in: MeshIn) -> vec3f {
@@ -38,9 +37,8 @@ fn world_of(in: MeshIn) -> vec3f {
     var out: MeshOut;
     out.clip = view.clip_from_world * vec4f(world_of(in), 1.0);
     // width times its inverse, so that no compiler treats it as a constant
-    out.one = view.size.x * view.size.z;
-    out.origin = vec3f(in.row_x.w, in.row_y.w, in.row_z.w);
-    out.offset = vec3f(dot(in.row_x.xyz, in.position), dot(in.row_y.xyz, in.position), dot(in.row_z.xyz, in.position));
+    let one = view.size.x * view.size.z;
+    out.offset_one = vec4f(dot(in.row_x.xyz, in.position), dot(in.row_y.xyz, in.position), dot(in.row_z.xyz, in.position), one);
     let cx = vec3f(in.row_x.x, in.row_y.x, in.row_z.x);
     let cy = vec3f(in.row_x.y, in.row_y.y, in.row_z.y);
     let cz = vec3f(in.row_x.z, in.row_y.z, in.row_z.z);
@@ -52,8 +50,9 @@ fn world_of(in: MeshIn) -> vec3f {
     out.color_rough = in.color_rough;
     out.other_metal = in.other_metal;
     out.pattern = in.pattern;
-    out.side = side;
+    out.origin_side = vec4f(in.row_x.w, in.row_y.w, in.row_z.w, side);
     out.place = vec3f(in.place.x, 1.0 - in.place.y, in.place.z / max(length(cx), 1e-9));
+    //KEPT out
     return out;
 }
 
@@ -68,18 +67,20 @@ fn world_of(in: MeshIn) -> vec3f {
 @fragment fn fs_nothing() {}
 
 fn mesh_color(in: MeshOut, front: bool) -> vec3f {
-    let world = in.origin + in.offset / in.one;
+    let one = in.offset_one.w;
+    let world = in.origin_side.xyz + in.offset_one.xyz / one;
     let s = view_depth_at(world);
     let to_eye = -normalize(ray_at(in.clip.xy).dir);
-    var normal = normalize(in.normal) * in.side;
+    var normal = normalize(in.normal) * in.origin_side.w;
     // a back face; triangles thinner than a pixel may be rounded inside out, so the normal must
     // agree
     if (!front && dot(normal, to_eye) < 0.0) { normal = -normal; }
-    return pixel_color(world, normal, to_eye, in.object / in.one, normalize(in.object_normal), s, in.clip.xy, in.place / in.one,
+    return pixel_color(world, normal, to_eye, in.object / one, normalize(in.object_normal), s, in.clip.xy, in.place / one,
         Appearance(in.color_rough, in.other_metal, in.pattern));
 }
 
 @fragment fn fs_mesh(in: MeshOut, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    //TAKE
     return vec4f(mesh_color(in, front), 1.0);
 }
 
@@ -92,13 +93,15 @@ struct GroundOut {
     @location(0) @interpolate(flat) color_rough: vec4f,
     @location(1) @interpolate(flat) other_metal: vec4f,
     @location(2) @interpolate(flat) pattern: vec4f,
+    //KEPT 3
 };
 
 @vertex fn vs_ground(in: MeshIn) -> GroundOut {
-    return GroundOut(view.clip_from_world * vec4f(world_of(in), 1.0), in.color_rough, in.other_metal, in.pattern);
+    return GroundOut(view.clip_from_world * vec4f(world_of(in), 1.0), in.color_rough, in.other_metal, in.pattern /*KEPT*/);
 }
 
 @fragment fn fs_ground(in: GroundOut) -> @location(0) vec4f {
+    //TAKE
     let ray = ray_at(in.clip.xy);
     let s = (scene.floor.w - ray.origin.z) / ray.dir.z;
     let place = vec3f(ray.origin.xy + s * ray.dir.xy, scene.floor.w);

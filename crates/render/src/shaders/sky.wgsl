@@ -1,8 +1,15 @@
-@vertex fn vs_sky(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    return vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0);
+struct SkyOut {
+    @builtin(position) clip: vec4f,
+    //KEPT 0
+};
+
+@vertex fn vs_sky(@builtin(vertex_index) index: u32) -> SkyOut {
+    return SkyOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0) /*KEPT*/);
 }
 
-@fragment fn fs_sky(@builtin(position) at: vec4f) -> @location(0) vec4f {
+@fragment fn fs_sky(in: SkyOut) -> @location(0) vec4f {
+    //TAKE
+    let at = in.clip;
     let c = backdrop_at(normalize(ray_at(at.xy).dir));
     if (scene.backdrop.w > 0.5) { return vec4f(c, 1.0); }
     // half a step of 8-bit sRGB, so that the gradient shows no bands

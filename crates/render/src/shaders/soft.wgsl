@@ -11,32 +11,40 @@ struct SoftOut {
     @location(0) @interpolate(flat) sphere: vec4f,
     @location(1) @interpolate(flat) color_opacity: vec4f,
     @location(2) @interpolate(flat) lit: f32,
+    //KEPT 3
 };
 
 @vertex fn vs_soft(in: SphereIn, @builtin(vertex_index) index: u32) -> SoftOut {
     let c = cover(in.sphere, index);
-    return SoftOut(vec4f(c.clip.xy / c.clip.w, c.depth, 1.0), in.sphere, in.color_rough, in.other_metal.x);
+    return SoftOut(vec4f(c.clip.xy / c.clip.w, c.depth, 1.0), in.sphere, in.color_rough, in.other_metal.x /*KEPT*/);
 }
 
 // Light that a sphere scatters to the eye: a point with the normal n gets light from half around.
 fn scattered(position: vec3f, n: vec3f) -> vec3f {
     var out = sky_irradiance(n) * scene.horizon.w;
-    for (var i = 0u; i < u32(scene.zenith.w); i++) {
-        let light = scene.lights[i];
-        var l = light.at.xyz;
-        var radiance = light.color.xyz;
-        if (light.at.w > 0.5) {
-            let d = light.at.xyz - position;
-            let d2 = max(dot(d, d), 1e-6);
-            l = d * inverseSqrt(d2);
-            radiance /= d2;
-        }
-        out += radiance * (0.5 + 0.5 * dot(n, l));
+    if (LIGHTS > 0u) { out += scattered_of(position, n, scene.lights[0]); }
+    if (LIGHTS > 1u) { out += scattered_of(position, n, scene.lights[1]); }
+    if (LIGHTS > 2u) { out += scattered_of(position, n, scene.lights[2]); }
+    if (LIGHTS > 3u) {
+        for (var i = 3u; i < u32(scene.zenith.w); i++) { out += scattered_of(position, n, scene.lights[i]); }
     }
     return out;
 }
 
+fn scattered_of(position: vec3f, n: vec3f, light: Light) -> vec3f {
+    var l = light.at.xyz;
+    var radiance = light.color.xyz;
+    if (light.at.w > 0.5) {
+        let d = light.at.xyz - position;
+        let d2 = max(dot(d, d), 1e-6);
+        l = d * inverseSqrt(d2);
+        radiance /= d2;
+    }
+    return radiance * (0.5 + 0.5 * dot(n, l));
+}
+
 @fragment fn fs_soft(in: SoftOut) -> @location(0) vec4f {
+    //TAKE
     let c = cross_sphere(in.sphere, in.clip.xy);
     if (c.room <= 0.0) { discard; }
     let r = in.sphere.w;

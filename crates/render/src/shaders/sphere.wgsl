@@ -15,6 +15,7 @@ struct SphereOut {
     @location(2) @interpolate(flat) color_rough: vec4f,
     @location(3) @interpolate(flat) other_metal: vec4f,
     @location(4) @interpolate(flat) pattern: vec4f,
+    //KEPT 5
 };
 struct Hit { s: f32, position: vec3f, normal: vec3f, to_eye: vec3f };
 
@@ -85,7 +86,7 @@ const NOWHERE = vec4f(0.0, 0.0, 2.0, 1.0);
 
 @vertex fn vs_shell(in: SphereIn, @builtin(vertex_index) index: u32) -> SphereOut {
     let c = cover(in.sphere, index);
-    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, in.turn, in.color_rough, in.other_metal, in.pattern /*KEPT*/);
 }
 
 // A sphere that may be visible, and its index.
@@ -109,7 +110,7 @@ fn read_appearance(id: u32) -> Appearance {
 @vertex fn vs_sphere(in: BoundsIn, @builtin(vertex_index) index: u32) -> SphereOut {
     let c = cover(in.sphere, index);
     let appearance = read_appearance(in.id);
-    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, bitcast<vec4f>(sphere_texel(in.id, 2u)), appearance.color_rough, appearance.other_metal, appearance.pattern);
+    return SphereOut(vec4f(c.clip.xy / c.clip.w, c.clip.z / c.clip.w, 1.0), in.sphere, bitcast<vec4f>(sphere_texel(in.id, 2u)), appearance.color_rough, appearance.other_metal, appearance.pattern /*KEPT*/);
 }
 
 // With d the ray's direction, of length 1, and c the vector to the center: m = c - (c·d) d is the
@@ -149,6 +150,7 @@ fn unturn(q: vec4f, v: vec3f) -> vec3f {
 }
 
 @fragment fn fs_sphere(in: SphereOut) -> SpherePixel {
+    //TAKE
     let pixel = in.clip.xy;
     let mask = sample_mask(in.sphere, pixel);
     let h = hit(in.sphere, pixel);
@@ -170,6 +172,7 @@ struct BoundsOut {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(linear) at: vec4f, // T, W, S
     @location(1) @interpolate(flat) id: u32,
+    @location(2) @interpolate(flat) line: vec2f, // depth = x + y (W + sqrt(S² - T²))
 };
 
 @vertex fn vs_bounds(in: BoundsIn, @builtin(vertex_index) index: u32) -> BoundsOut {
@@ -183,26 +186,26 @@ struct BoundsOut {
     } else {
         at.z = -dot(in.sphere.xyz - view.origin_0.xyz, view.dir_0.xyz) / dot(view.dir_0.xyz, view.dir_0.xyz);
     }
-    return BoundsOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id);
+    let line = select(vec2f(view.depth.y, -view.depth.x), view.depth.xy, view.lens.x > 0.5);
+    return BoundsOut(select(vec4f(c.clip.xyz * per_w, 1.0), NOWHERE, c.near), at, in.id, line);
 }
 
-fn bounds_depth(at: vec4f) -> f32 {
+fn bounds_depth(at: vec4f, line: vec2f) -> f32 {
     let room = at.w * at.w - dot(at.xy, at.xy);
-    let line = select(vec2f(view.depth.y, -view.depth.x), view.depth.xy, view.lens.x > 0.5);
     let depth = line.x + line.y * (at.z + sqrt(max(room, 0.0)));
     if (room < 0.0 || depth > 1.0 || depth < 0.0) { discard; }
     return depth;
 }
 
 @fragment fn fs_bounds_depth(in: BoundsOut) -> @builtin(frag_depth) f32 {
-    return bounds_depth(in.at);
+    return bounds_depth(in.at, in.line);
 }
 
 struct BoundsPixel { @location(0) id: u32, @builtin(frag_depth) depth: f32 };
 
 // Index of the nearest sphere, from 1 on.
 @fragment fn fs_bounds_id(in: BoundsOut) -> BoundsPixel {
-    return BoundsPixel(in.id + 1u, bounds_depth(in.at));
+    return BoundsPixel(in.id + 1u, bounds_depth(in.at, in.line));
 }
 
 // Spheres too near to the eye, drawn over the whole picture.
@@ -226,15 +229,26 @@ fn near_depth(sphere: vec4f, pixel: vec2f) -> f32 {
 }
 
 @fragment fn fs_near_depth(in: NearOut) -> @builtin(frag_depth) f32 {
+    //TAKE view
     return near_depth(in.sphere, in.clip.xy);
 }
 
 @fragment fn fs_near_id(in: NearOut) -> BoundsPixel {
+    //TAKE view
     return BoundsPixel(in.id + 1u, near_depth(in.sphere, in.clip.xy));
 }
 
+struct SeenOut {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) range: vec2u,
+    //KEPT 1
+};
+
 // All spheres of one surface at once, if the nearest is known: each pixel is lit once.
-@fragment fn fs_sphere_seen(@builtin(position) at: vec4f, @location(0) @interpolate(flat) range: vec2u) -> @location(0) vec4f {
+@fragment fn fs_sphere_seen(in: SeenOut) -> @location(0) vec4f {
+    //TAKE
+    let at = in.clip;
+    let range = in.range;
     let id = textureLoad(seen_id, vec2i(at.xy), 0).x - 1u;
     if (id < range.x || id >= range.y) { discard; }
     let sphere = bitcast<vec4f>(sphere_texel(id, 0u));
@@ -245,15 +259,14 @@ fn near_depth(sphere: vec4f, pixel: vec2f) -> f32 {
     return vec4f(pixel_color(h.position, h.normal, h.to_eye, object_normal * sphere.w, object_normal, h.s, at.xy, vec3f(0.0), appearance), 1.0);
 }
 
-struct SeenOut { @builtin(position) clip: vec4f, @location(0) @interpolate(flat) range: vec2u };
-
 // The whole picture, for a range of sphere indices.
 @vertex fn vs_seen(@location(0) range: vec2u, @builtin(vertex_index) index: u32) -> SeenOut {
-    return SeenOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0), range);
+    return SeenOut(vec4f(select(-1.0, 3.0, index == 1u), select(-1.0, 3.0, index == 2u), 0.0, 1.0), range /*KEPT*/);
 }
 
 // A translucent shell: clear in the middle, denser at the rim.
 @fragment fn fs_shell(in: SphereOut) -> SpherePixel {
+    //TAKE
     let pixel = in.clip.xy;
     let mask = sample_mask(in.sphere, pixel);
     let h = hit(in.sphere, pixel);

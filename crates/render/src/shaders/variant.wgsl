@@ -8,3 +8,4 @@ override SOFTBOX: bool = true;   // whether there is a panel overhead
 override OCCLUSION: bool = true; // whether the occlusion map was drawn
 override REFLECTIONS: bool = true; // whether surfaces reflect the sky; otherwise light is a cheap approximation
 override ONE_SUN: bool = false; // whether the only light is directional
+override LIGHTS: u32 = 4u; // number of lights; 4: more than three
