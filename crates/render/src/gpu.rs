@@ -10,6 +10,7 @@ mod particles;
 mod pipeline_plan;
 mod pipelines;
 mod portable;
+mod reading;
 mod recipe;
 mod scene;
 mod shadow;
@@ -32,6 +33,8 @@ pub use particles::{
 };
 use pipelines::Pipelines;
 pub use portable::{PortableDraw, PortableItems, PortableKey, PortablePicture, PortableView};
+use reading::Readbacks;
+pub use reading::Reading;
 pub use recipe::{GlslProgram, GlslTranslator, Recipe, portable_pass_wgsl, portable_wgsl};
 pub use stage::Stage;
 use stage::Textures;
@@ -58,6 +61,7 @@ pub struct Renderer {
     targets: Vec<Targets>,
     /// The finished picture.
     picture: Option<wgpu::Texture>,
+    readbacks: Readbacks,
     stages: u64,
     /// Ends of frames that the device may not have reached yet.
     ends: std::collections::VecDeque<wgpu::SubmissionIndex>,
@@ -75,6 +79,8 @@ pub(crate) struct Gpu {
     choosy: bool,
     /// Whether fragment stages take the numbers of uniforms as inputs, as for software drivers.
     flat_inputs: bool,
+    /// Commands that are not submitted yet.
+    recorded: Mutex<Vec<wgpu::CommandBuffer>>,
     complaint: Arc<Mutex<Option<String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
@@ -125,6 +131,7 @@ impl Renderer {
             shadows: None,
             targets: Vec::new(),
             picture: None,
+            readbacks: Readbacks::default(),
             stages: 0,
             ends: Default::default(),
         })
@@ -218,10 +225,27 @@ impl Renderer {
     /// # Errors
     /// A device that fails or hangs, or no picture yet.
     pub fn read(&self) -> Result<Image, RenderError> {
-        let picture = self.picture.as_ref().ok_or_else(|| self.gpu.failed("no picture was drawn yet".into()))?;
-        let image = targets::read(&self.gpu, picture);
+        let image = self.begin_read()?.finish();
         self.gpu.complaint()?;
         image
+    }
+
+    /// Begins to copy the last picture into memory. Further pictures may be drawn meanwhile, and any
+    /// thread may wait for this one ([`Reading::finish`]).
+    ///
+    /// # Errors
+    /// No picture yet, or a device that has failed.
+    pub fn begin_read(&self) -> Result<Reading, RenderError> {
+        let picture = self.picture.as_ref().ok_or_else(|| self.gpu.failed("no picture was drawn yet".into()))?;
+        let reading = Reading::begin(&self.gpu, &self.readbacks, picture);
+        self.gpu.complaint()?;
+        Ok(reading)
+    }
+
+    /// Submits all pictures that are recorded.
+    pub(crate) fn submit(&self) -> Result<(), RenderError> {
+        self.gpu.submit();
+        self.gpu.complaint()
     }
 
     /// Waits until the device has finished its work.
@@ -238,7 +262,7 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::wait`].
     pub fn end_frame(&mut self, ahead: usize) -> Result<(), RenderError> {
-        self.ends.push_back(self.gpu.queue.submit([]));
+        self.ends.push_back(self.gpu.submit());
         while self.ends.len() > ahead {
             targets::wait_for(&self.gpu, self.ends.pop_front())?;
         }
@@ -262,10 +286,10 @@ impl Renderer {
             Some(t) => Some(self.finisher.cut(&self.gpu, &t.resolved, rim)),
             None => None,
         };
-        self.gpu.complaint()
+        self.submit()
     }
 
-    /// Draws a view into the last targets. Returns the width of the rim in pixels.
+    /// Records a view into the last targets. Returns the width of the rim in pixels.
     fn draw_with_rim(&mut self, stage: &Stage, mut lens: Lens, width: u32, height: u32) -> Result<u32, RenderError> {
         // only occlusion reads beyond the edge
         let rim = lens.part.map_or(0, |part| if stage.reach > 0.0 { part.rim_px } else { 0 });
@@ -290,13 +314,13 @@ impl Renderer {
         let frame = Frame::new(&self.gpu, &self.pipelines, stage, maps, targets, &lens)?;
         self.gpu.complaint()?;
         frame.draw(&mut encoder, &self.pipelines);
-        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.record(encoder.finish());
         self.gpu.complaint()?;
         Ok(rim)
     }
 
-    /// Draws the view of one eye, finishes it for its projector, and places it in the whole picture
-    /// of this size.
+    /// Records the view of one eye, finished for its projector, at its place in the whole picture of this
+    /// size. [`submit`](Self::submit) follows.
     pub(crate) fn draw_placed(
         &mut self,
         stage: &Stage,
@@ -313,8 +337,8 @@ impl Renderer {
         self.gpu.complaint()
     }
 
-    /// Draws the view of a face of the cube of pictures into its tile, `side` pixels wide, at a place
-    /// of the picture of all tiles.
+    /// Records the view of a face of the cube of pictures in its tile, `side` pixels wide, at a place
+    /// of the picture of all tiles. [`submit`](Self::submit) follows.
     pub(crate) fn draw_face(
         &mut self,
         stage: &Stage,
@@ -329,8 +353,8 @@ impl Renderer {
         self.gpu.complaint()
     }
 
-    /// Finishes a picture on a curved screen from the faces drawn before, and places it in the whole
-    /// picture.
+    /// Records a picture on a curved screen from the faces recorded before, at its place in the whole
+    /// picture. [`submit`](Self::submit) follows.
     pub(crate) fn place_surface(&mut self, around: Around, size: [u32; 2], placed: &Placed) -> Result<(), RenderError> {
         self.check_size(placed.whole_px[0], placed.whole_px[1])?;
         self.picture = Some(self.finisher.place_surface(&self.gpu, around, size, placed)?);
@@ -413,7 +437,20 @@ impl Gpu {
                 .unwrap_or_else(PoisonError::into_inner)
                 .get_or_insert(format!("the device was lost{why}; a new renderer can be made"));
         });
-        Ok(Gpu { device: asked.0, queue: asked.1, adapter: name, opengl, choosy, flat_inputs, complaint, lost })
+        let (device, queue) = asked;
+        let recorded = Mutex::default();
+        Ok(Gpu { device, queue, adapter: name, opengl, choosy, flat_inputs, recorded, complaint, lost })
+    }
+
+    /// Keeps commands for the next [`submit`](Self::submit).
+    fn record(&self, commands: wgpu::CommandBuffer) {
+        self.recorded.lock().unwrap_or_else(PoisonError::into_inner).push(commands);
+    }
+
+    /// Submits all recorded commands together.
+    fn submit(&self) -> wgpu::SubmissionIndex {
+        let recorded = std::mem::take(&mut *self.recorded.lock().unwrap_or_else(PoisonError::into_inner));
+        self.queue.submit(recorded)
     }
 
     /// Returns the first device error since the last call.

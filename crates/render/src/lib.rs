@@ -48,7 +48,7 @@ pub use facet::{
 };
 pub use gpu::{
     FreeParticle, FreeParticles, GlslProgram, GlslTranslator, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle,
-    ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, PortableView, Precision, Recipe,
+    ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, PortableView, Precision, Reading, Recipe,
     Renderer, Screen, Shown, Stage, portable_pass_wgsl, portable_wgsl,
 };
 pub use image::Image;

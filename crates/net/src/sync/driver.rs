@@ -2,7 +2,7 @@
 //! [`Facet`].
 
 use super::compute::{FrameInputs, Simulation};
-use super::facet::{FacetOptions, FacetSession, Task};
+use super::facet::{AppliedFrame, FacetOptions, FacetSession, Task};
 use super::input::Input;
 use super::messages::FacetCounts;
 use super::publisher::PublishError;
@@ -12,7 +12,7 @@ use super::transport::{FacetLink, FacetNumber, LinkCounters, LinkError, Message,
 use super::viewer::Viewer;
 use super::wire::Hash;
 use std::time::{Duration, Instant};
-use tumble_core::World;
+use tumble_core::{World, WorldError};
 
 /// Error of a server or a facet that ends its session.
 #[derive(Debug, thiserror::Error)]
@@ -263,6 +263,14 @@ impl<L: FacetLink> Facet<L> {
         Facet { link, session: FacetSession::computing(options, simulation), start: Instant::now() }
     }
 
+    /// Creates a session that follows another one of this process; see [`FacetSession::following`].
+    ///
+    /// # Errors
+    /// As [`FacetSession::following`].
+    pub fn following(link: L, options: FacetOptions, computing: bool) -> Result<Facet<L>, WorldError> {
+        Ok(Facet { link, session: FacetSession::following(options, computing)?, start: Instant::now() })
+    }
+
     /// Waits at most `timeout` for the next task and returns it. On [`Task::Draw`] call
     /// [`begin`](Self::begin), draw, then call [`drawn`](Self::drawn). On [`Task::Present`] show
     /// the picture and call [`presented`](Self::presented). On [`Task::Wait`] process window events
@@ -286,6 +294,16 @@ impl<L: FacetLink> Facet<L> {
     /// scene and was refused.
     pub fn begin(&mut self) -> Option<u64> {
         self.session.begin()
+    }
+
+    /// Returns the frame that has begun, for followers; see [`FacetSession::applied`].
+    pub fn applied(&mut self) -> Option<AppliedFrame> {
+        self.session.applied()
+    }
+
+    /// Begins the waiting frame if the leader has applied it; see [`FacetSession::follow`].
+    pub fn follow(&mut self, leader: &AppliedFrame) -> bool {
+        self.session.follow(leader)
     }
 
     /// Returns the world to draw.

@@ -102,7 +102,7 @@ mod wire;
 pub use compute::{FrameInputs, Simulation, StateHashes};
 pub use contacts::MAX_CONTACTS;
 pub use driver::{Facet, Server, SessionError};
-pub use facet::{EndReason, FacetOptions, FacetSession, Task, WaitReason};
+pub use facet::{AppliedFrame, EndReason, FacetOptions, FacetSession, Task, WaitReason};
 pub use input::{Input, MAX_KEYS};
 pub use local::{LocalFacet, LocalServer, LocalTransport};
 pub use messages::{Content, FacetCounts, FrameAck};

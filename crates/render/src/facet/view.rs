@@ -207,7 +207,7 @@ impl CaveView {
                 }
             }
         }
-        Ok(())
+        renderer.submit()
     }
 
     /// Returns what the pixels of a facet on a curved screen show.
@@ -308,7 +308,7 @@ impl CaveView {
                 None => renderer.draw_placed(stage, &self.eye(facet, 0.0)?.part(w, h, RIM_PX), [w, h], &placed)?,
             }
         }
-        Ok(())
+        renderer.submit()
     }
 
     /// Returns the curved screen of a tile, from those kept; `None` for a flat one.

@@ -182,7 +182,7 @@ impl Finisher {
         let whole = self.whole(gpu, size);
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("cut") });
         copy(&mut encoder, from, rim, size, &whole, [0, 0]);
-        gpu.queue.submit([encoder.finish()]);
+        gpu.record(encoder.finish());
         whole
     }
 
@@ -204,7 +204,7 @@ impl Finisher {
         if plain {
             copy(&mut encoder, &from.resolved, rim, size, &whole, placed.at_px);
         }
-        gpu.queue.submit([encoder.finish()]);
+        gpu.record(encoder.finish());
         Ok(whole)
     }
 
@@ -217,7 +217,7 @@ impl Finisher {
         };
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("face") });
         copy(&mut encoder, &from.resolved, rim, [side; 2], faces, at);
-        gpu.queue.submit([encoder.finish()]);
+        gpu.record(encoder.finish());
     }
 
     /// Places a picture on a curved screen, taken from the faces, and returns the whole.
@@ -233,7 +233,7 @@ impl Finisher {
         let faces = faces.create_view(&TextureViewDescriptor::default());
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
         self.pass(gpu, &mut encoder, (&faces, &whole), (0, size, placed), Some(around))?;
-        gpu.queue.submit([encoder.finish()]);
+        gpu.record(encoder.finish());
         Ok(whole)
     }
 

@@ -1,12 +1,12 @@
-//! The textures that are drawn into, and the transfer to memory.
+//! The textures that are drawn into.
 
 use super::Gpu;
 use super::pipelines::{COLOR, DEPTH, ID, OCCLUSION};
-use crate::{Image, RenderError};
+use crate::RenderError;
 use wgpu::{Extent3d, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor};
 
 /// Longest time for a picture; after it the device counts as hung.
-const PATIENCE: std::time::Duration = std::time::Duration::from_secs(600);
+pub(super) const PATIENCE: std::time::Duration = std::time::Duration::from_secs(600);
 
 const DRAW: TextureUsages = TextureUsages::RENDER_ATTACHMENT;
 const LOOK: TextureUsages = DRAW.union(TextureUsages::TEXTURE_BINDING);
@@ -102,41 +102,6 @@ pub fn finished_texture(device: &wgpu::Device, label: &str, width: u32, height: 
     texture(device, label, [width, height, 1], 1, COLOR, LOOK | TextureUsages::COPY_SRC | TextureUsages::COPY_DST)
 }
 
-/// Copies a finished picture to memory; waits for the device.
-pub fn read(gpu: &Gpu, from: &Texture) -> Result<Image, RenderError> {
-    let (width, height) = (from.width(), from.height());
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("readback"),
-        size: u64::from(pitch(width)) * u64::from(height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("readback") });
-    let layout =
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch(width)), rows_per_image: Some(height) };
-    encoder.copy_texture_to_buffer(
-        from.as_image_copy(),
-        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-        Extent3d { width, height, depth_or_array_layers: 1 },
-    );
-    gpu.queue.submit([encoder.finish()]);
-    let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.map_async(wgpu::MapMode::Read, .., move |r| {
-        let _ = sender.send(r); // the receiver waits below
-    });
-    wait(gpu)?;
-    receiver.recv().map_err(|e| gpu.failed(e.to_string()))?.map_err(|e| gpu.failed(e.to_string()))?;
-    let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
-    {
-        let bytes = buffer.get_mapped_range(..).map_err(|e| gpu.failed(e.to_string()))?;
-        for row in bytes.chunks_exact(pitch(width) as usize) {
-            rgba.extend_from_slice(&row[..4 * width as usize]);
-        }
-    }
-    buffer.unmap();
-    Ok(Image { width, height, rgba })
-}
-
 /// Waits until all submitted work is done.
 pub fn wait(gpu: &Gpu) -> Result<(), RenderError> {
     wait_for(gpu, None)
@@ -147,11 +112,6 @@ pub fn wait_for(gpu: &Gpu, submission_index: Option<wgpu::SubmissionIndex>) -> R
     let done = gpu.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(PATIENCE) });
     gpu.complaint()?;
     done.map(drop).map_err(|e| gpu.failed(e.to_string()))
-}
-
-/// Bytes per row in the buffer: wgpu needs a multiple of 256.
-fn pitch(width: u32) -> u32 {
-    (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
 
 fn whole(t: Texture) -> TextureView {

@@ -209,7 +209,8 @@ impl Screen {
         for (texture, pipeline, left) in picture.into_iter().chain(caption).chain(panel) {
             self.copies.copy(gpu, &mut encoder, pipeline, (texture, left), (&target, frame.texture.size()), encode)?;
         }
-        gpu.queue.submit([encoder.finish()]);
+        gpu.record(encoder.finish());
+        gpu.submit();
         self.window.pre_present_notify();
         gpu.queue.present(frame);
         self.renderer.end_frame(1)?;

@@ -13,6 +13,8 @@
 //! target:           whole_px, and size_px with a rim of 48 pixels, each side ≤ 16384 and 2²⁵ pixels together
 //! ```
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use super::Cave;
@@ -20,6 +22,7 @@ use super::facet::{Facet, Stereo};
 use super::parts::{Screen, User};
 use super::surface::Surface;
 use crate::parse::fields::Fields;
+use crate::parse::log::Log;
 
 /// Largest cosine between the edges of a screen's corner: 1 mm in a meter.
 pub const SQUARE_TOLERANCE: f64 = 1e-3;
@@ -93,6 +96,25 @@ pub(crate) fn swapped(facet: &Facet, f: &mut Fields<'_>) {
         let place = f.value("swap_eyes").map_or(f.span.clone(), |value| value.span());
         let message = format!("`swap_eyes` of {}: its image has one eye", f.what);
         f.log.report(place, message, "expected `stereo` with both eyes, such as \"rows\"");
+    }
+}
+
+/// Checks that the facets of a process are on one node and use one adapter. `places` are those of the
+/// facets' tables.
+pub(crate) fn processes(cave: &Cave, log: &Log<'_>, places: &[Range<usize>]) {
+    for (k, facet) in cave.facets.iter().enumerate() {
+        let Some(process) = &facet.process else { continue };
+        let first = cave.facets[..k].iter().find(|other| other.process == facet.process);
+        let place = places.get(k).cloned().unwrap_or(0..0);
+        let wrong = |what: &str, first: &Facet| {
+            let message = format!(
+                "facet \"{}\" is in the process \"{process}\" of facet \"{}\", which has another `{what}`",
+                facet.name, first.name
+            );
+            log.report(place.clone(), message, format!("expected one `{what}` for all facets of a process"));
+        };
+        first.filter(|first| first.node != facet.node).into_iter().for_each(|first| wrong("node", first));
+        first.filter(|first| first.display.gpu != facet.display.gpu).into_iter().for_each(|first| wrong("gpu", first));
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::checks;
-use super::parts::{Node, Screen, User, read_name};
+use super::parts::{NAME, Node, Screen, User, is_name, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 
@@ -145,6 +145,9 @@ pub struct Facet {
     pub user: usize,
     /// Index of the node that draws it; `None` for the machine that runs the world.
     pub node: Option<usize>,
+    /// Name of the process that draws it, together with the other facets of this name, on the same node
+    /// and adapter. Default a process of its own.
+    pub process: Option<String>,
     /// The place where the image is shown. Default a window at 0, 0.
     pub output: Output,
     /// Its graphics card and its monitor.
@@ -236,6 +239,7 @@ impl Facet {
         let node = f
             .optional_text("node")
             .map(|(typed, value)| reference(&f, "node", typed, value, nodes.iter().map(|n| n.name.as_str()).collect()));
+        let process = process(&mut f);
         let target = f.optional_choice("output", TARGETS);
         let window_required = matches!(target, Some(Target::Window));
         let output = match target.unwrap_or(Target::Window) {
@@ -249,6 +253,7 @@ impl Facet {
             screen: screen.unwrap_or(usize::MAX),
             user: user.unwrap_or(usize::MAX),
             node: node.flatten(),
+            process,
             output,
             display,
             window_required,
@@ -311,6 +316,15 @@ fn reference(
         f.unknown_name(key, value, typed, known);
     }
     found
+}
+
+/// Reads the name of the process.
+fn process(f: &mut Fields<'_>) -> Option<String> {
+    let (name, value) = f.optional_text("process")?;
+    if !is_name(name) {
+        f.wrong("process", value, NAME);
+    }
+    Some(name.to_owned())
 }
 
 /// Reads the table `color`.

@@ -148,6 +148,8 @@ impl Cave {
         let recording = read_table(&mut f, "recording", |table| Recording::read(table, folder)).flatten();
         let tracker = read_table(&mut f, "tracker", |table| Tracker::read(table, &users, security.is_some()));
         let place = f.value("sync").map_or(0..0, |value| value.span());
+        let tables = f.value("facet").and_then(|value| value.get_ref().as_array());
+        let places: Vec<_> = tables.into_iter().flat_map(|tables| tables.iter().map(|table| table.span())).collect();
         f.finish();
         let cave = Cave {
             file: file_name.to_owned(),
@@ -163,6 +165,7 @@ impl Cave {
         };
         if log.count() == 0 {
             settings::check_reach(&cave, log, &place);
+            checks::processes(&cave, log, &places);
         }
         cave
     }

@@ -241,6 +241,16 @@ fn is_address(text: &str) -> bool {
     text.parse::<IpAddr>().is_ok() || (text.len() <= 253 && text.split('.').all(label))
 }
 
+/// The names that are allowed.
+pub(crate) const NAME: &str = "1 to 64 letters, digits, _ - . and inner spaces";
+
+/// Returns whether a name is allowed.
+pub(crate) fn is_name(name: &str) -> bool {
+    (1..=64).contains(&name.chars().count())
+        && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c))
+        && name.trim() == name
+}
+
 /// Reads the `name` of a table, which messages use from then on. `None`, with the problem recorded,
 /// if it has none.
 pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
@@ -249,11 +259,8 @@ pub(crate) fn read_name(f: &mut Fields<'_>) -> Option<String> {
         // The other keys do not depend on the name, so they are read even without one.
         return Some(String::new());
     };
-    let right = (1..=64).contains(&name.chars().count())
-        && name.chars().all(|c| c.is_alphanumeric() || "_- .".contains(c))
-        && name.trim() == name;
-    if !right {
-        f.wrong("name", value, "1 to 64 letters, digits, _ - . and inner spaces");
+    if !is_name(name) {
+        f.wrong("name", value, NAME);
     }
     f.what = format!("{kind} \"{name}\"");
     Some(name.to_owned())

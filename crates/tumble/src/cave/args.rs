@@ -327,6 +327,10 @@ pub struct CaveOptions {
     /// per facet.
     #[arg(long)]
     pub preview: bool,
+    /// Draw all facets of a machine with one graphics adapter in one process, into memory, instead of one
+    /// process per facet (default: as `process` in the cave file says).
+    #[arg(long, conflicts_with = "preview")]
+    pub one_process: bool,
     /// Restart a facet that ended by itself or was killed, at most 5 times in a minute.
     #[arg(long)]
     pub restart: bool,
@@ -390,9 +394,10 @@ pub struct FacetOptions {
     /// For tests of the comparison: after this frame of the world one bit of its state is wrong.
     #[arg(long, hide = true, value_name = "N")]
     pub disturb_after: Option<u64>,
-    /// Name of the facet in the cave.
-    #[arg(long, value_name = "NAME", required_unless_present = "preview")]
-    pub facet: Option<String>,
+    /// Name of the facet in the cave. Several names, separated by commas, are drawn by this process
+    /// together, into memory: with one device and one copy of the world.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', required_unless_present = "preview")]
+    pub facet: Vec<String>,
     /// Draw all facets in one picture, for a server started with --preview.
     #[arg(long, conflicts_with = "facet")]
     pub preview: bool,

@@ -2,10 +2,12 @@
 //! and which launch commands such as `ssh` pass on.
 //!
 //! ```text
-//! tumble-facet {"number":7,"preparing":false,"written":41,"waiting":2,"progress":5210,…}
-//! tumble-facet-line draws into memory, because …
-//! tumble-facet-picture 89504e47…
+//! tumble-facet 0 {"number":7,"preparing":false,"written":41,"waiting":2,"progress":5210,…}
+//! tumble-facet-line 0 draws into memory, because …
+//! tumble-facet-picture 0 89504e47…
 //! ```
+//!
+//! The number counts the facets of the process.
 //!
 //! So the launcher waits for a facet that works and does not wait for one that hangs. Other lines
 //! are ignored.
@@ -96,13 +98,14 @@ struct Outbox {
 }
 
 impl Outbox {
-    /// Returns what waits as lines.
-    fn take(&mut self) -> String {
+    /// Returns what waits as lines of a facet.
+    fn take(&mut self, member: usize) -> String {
         let one_line = |text: &String| text.replace(['\n', '\r'], " ");
-        let mut text: String = self.lines.iter().map(|line| format!("{LINE_MARK}{}\n", one_line(line))).collect();
+        let mut text: String =
+            self.lines.iter().map(|line| format!("{LINE_MARK}{member} {}\n", one_line(line))).collect();
         self.lines.clear();
         if let Some(png) = self.picture.take() {
-            text += &format!("{PICTURE_MARK}{}\n", png.iter().map(|b| format!("{b:02x}")).collect::<String>());
+            text += &format!("{PICTURE_MARK}{member} {}\n", png.iter().map(|b| format!("{b:02x}")).collect::<String>());
         }
         text
     }
@@ -115,13 +118,16 @@ pub struct Reporter {
     outbox: Arc<Mutex<Outbox>>,
     /// Whether there is a launcher to report to.
     speaks: bool,
+    /// Number of the facet in its process.
+    member: usize,
 }
 
 impl Reporter {
-    /// Starts to report to a launcher, if there is one.
-    pub fn start(to_launcher: bool) -> Result<Reporter, Failure> {
+    /// Starts to report to a launcher, if there is one. `member` counts the facets of this process.
+    pub fn start(to_launcher: bool, member: usize) -> Result<Reporter, Failure> {
         let report = FacetReport { preparing: true, ..FacetReport::default() };
-        let reporter = Reporter { report: Arc::new(Mutex::new(report)), outbox: Arc::default(), speaks: to_launcher };
+        let (report, outbox) = (Arc::new(Mutex::new(report)), Arc::default());
+        let reporter = Reporter { report, outbox, speaks: to_launcher, member };
         if to_launcher {
             let ours = reporter.clone();
             std::thread::Builder::new()
@@ -155,10 +161,10 @@ impl Reporter {
     /// Reports the present state at once.
     pub fn flush(&self) {
         if self.speaks {
-            let _ = write_text(&lock(&self.outbox).take());
+            let _ = write_text(&lock(&self.outbox).take(self.member));
             let report = self.next();
             // a launcher that is gone reads nothing
-            let _ = write_line(&report);
+            let _ = write_line(self.member, &report);
         }
     }
 
@@ -172,7 +178,7 @@ impl Reporter {
         let (mut last, mut silent) = (FacetReport::default(), 0);
         loop {
             let now = lock(&self.report).clone();
-            let text = lock(&self.outbox).take();
+            let text = lock(&self.outbox).take(self.member);
             // the lock is free while this waits for the pipe
             if !text.is_empty() && write_text(&text).is_err() {
                 return;
@@ -181,7 +187,7 @@ impl Reporter {
             if now != last || now.preparing && silent >= HEARTBEAT_INTERVALS {
                 // the lock is free while this waits for the pipe
                 let next = self.next();
-                if write_line(&next).is_err() {
+                if write_line(self.member, &next).is_err() {
                     return;
                 }
                 (last, silent) = (next, 0);
@@ -191,8 +197,8 @@ impl Reporter {
     }
 }
 
-fn write_line(report: &FacetReport) -> std::io::Result<()> {
-    write_text(&format!("{MARK}{}\n", serde_json::to_string(report)?))
+fn write_line(member: usize, report: &FacetReport) -> std::io::Result<()> {
+    write_text(&format!("{MARK}{member} {}\n", serde_json::to_string(report)?))
 }
 
 fn write_text(text: &str) -> std::io::Result<()> {
@@ -231,28 +237,30 @@ impl Received {
 
 /// The launcher's side: reads a pipe to its end.
 pub struct ReportReader {
-    received: Arc<Mutex<Received>>,
+    /// By facet of the process.
+    received: Arc<Vec<Mutex<Received>>>,
     thread: JoinHandle<()>,
 }
 
 impl ReportReader {
-    /// Starts to read.
-    pub fn start(pipe: impl Read + Send + 'static) -> std::io::Result<ReportReader> {
-        let received = Arc::new(Mutex::new(Received::default()));
+    /// Starts to read the reports of a process with this number of facets.
+    pub fn start(pipe: impl Read + Send + 'static, members: usize) -> std::io::Result<ReportReader> {
+        let received: Arc<Vec<_>> = Arc::new((0..members).map(|_| Mutex::default()).collect());
         let theirs = received.clone();
         let thread =
             std::thread::Builder::new().name("facet reports".into()).spawn(move || read_lines(pipe, &theirs))?;
         Ok(ReportReader { received, thread })
     }
 
-    /// Returns the newest report.
-    pub fn received(&self) -> Received {
-        lock(&self.received).clone()
+    /// Returns the newest report of a facet.
+    pub fn received(&self, member: usize) -> Received {
+        self.received.get(member).map_or_else(Received::default, |received| lock(received).clone())
     }
 
-    /// Takes the messages and the picture that have arrived.
-    pub fn take_messages(&self) -> (VecDeque<String>, Option<Vec<u8>>) {
-        let mut received = lock(&self.received);
+    /// Takes the messages and the picture of a facet that have arrived.
+    pub fn take_messages(&self, member: usize) -> (VecDeque<String>, Option<Vec<u8>>) {
+        let Some(received) = self.received.get(member) else { return Default::default() };
+        let mut received = lock(received);
         (std::mem::take(&mut received.lines), received.picture.take())
     }
 
@@ -266,7 +274,7 @@ impl ReportReader {
     }
 }
 
-fn read_lines(mut pipe: impl Read, received: &Mutex<Received>) {
+fn read_lines(mut pipe: impl Read, received: &[Mutex<Received>]) {
     let (mut line, mut too_long, mut bytes) = (Vec::new(), false, [0; 4096]);
     while let Ok(length @ 1..) = pipe.read(&mut bytes) {
         for &byte in &bytes[..length] {
@@ -284,16 +292,21 @@ fn read_lines(mut pipe: impl Read, received: &Mutex<Received>) {
     }
 }
 
-fn take_line(line: &str, received: &Mutex<Received>) {
-    if let Some(report) = line.strip_prefix(MARK).and_then(|json| serde_json::from_str(json).ok()) {
-        lock(received).take(report);
-    } else if let Some(text) = line.strip_prefix(LINE_MARK) {
-        let lines = &mut lock(received).lines;
+fn take_line(line: &str, received: &[Mutex<Received>]) {
+    // the facet's part of the table, and the rest of the line
+    let marked = |mark: &str| {
+        let (member, text) = line.strip_prefix(mark)?.split_once(' ')?;
+        Some((received.get(member.parse::<usize>().ok()?)?, text))
+    };
+    if let Some((of, json)) = marked(MARK) {
+        serde_json::from_str(json).into_iter().for_each(|report| lock(of).take(report));
+    } else if let Some((of, text)) = marked(LINE_MARK) {
+        let lines = &mut lock(of).lines;
         if lines.len() < MAX_MESSAGES {
             lines.push_back(text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect());
         }
-    } else if let Some(png) = line.strip_prefix(PICTURE_MARK).and_then(bytes_of) {
-        lock(received).picture = Some(png);
+    } else if let Some((of, png)) = marked(PICTURE_MARK).and_then(|(of, hex)| Some((of, bytes_of(hex)?))) {
+        lock(of).picture = Some(png);
     }
 }
 
@@ -317,21 +330,24 @@ mod tests {
     fn reports_are_found_among_other_lines_and_the_newest_counts() {
         let report =
             |number, written| FacetReport { number, written, waiting: 1, progress: 9, ..FacetReport::default() };
-        let line = |r: &FacetReport| format!("{MARK}{}\n", serde_json::to_string(r).unwrap());
+        let line = |r: &FacetReport| format!("{MARK}1 {}\n", serde_json::to_string(r).unwrap());
         let text = [
             "Welcome to this machine\n".to_owned(),
             line(&report(1, 3)),
-            format!("{MARK}{{\"number\":9}}\n"),
-            format!("{MARK}{}\n", "x".repeat(200_000)),
+            format!("{MARK}1 {{\"number\":9}}\n"),
+            format!("{MARK}1 {}\n", "x".repeat(200_000)),
+            line(&report(8, 9)).replace(" 1 ", " 2 "), // there is no such facet
+            line(&report(8, 9)).replace(" 1 ", " 0 "),
             line(&report(3, 5)),
             line(&report(2, 4)),
-            format!("{LINE_MARK}no\twindow\n{PICTURE_MARK}00ff1\n{PICTURE_MARK}00fF\n"),
+            format!("{LINE_MARK}1 no\twindow\n{PICTURE_MARK}1 00ff1\n{PICTURE_MARK}1 00fF\n"),
             line(&report(4, 6)).trim_end().to_owned(),
         ]
         .concat();
-        let received = Mutex::new(Received::default());
+        let received = [(); 2].map(|()| Mutex::new(Received::default()));
         read_lines(text.as_bytes(), &received);
-        let received = received.into_inner().unwrap();
+        let [first, received] = received.map(|received| received.into_inner().unwrap());
+        assert_eq!(first.report, report(8, 9));
         assert_eq!(received.report, report(3, 5));
         assert_eq!((received.lines, received.picture), (["no window".to_owned()].into(), Some(vec![0, 255])));
     }

@@ -13,11 +13,13 @@ use super::super::mirror::Mirror;
 use super::super::transport::Message;
 use super::super::viewer::Viewer;
 use super::super::wire::{HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, is_later};
+use super::following::Followed;
 use super::{FacetSession, PendingState, Phase};
 use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
 
+pub(super) const NO_MIRROR: MessageError = MessageError::Malformed("poses for a facet that steps by itself");
 /// Maximum number of frames that wait; a facet that is farther behind asks for a world. Frames wait
 /// while a large world is on its way, so this is longer than that takes.
 const MAX_WAITING_FRAMES: usize = 600;
@@ -31,6 +33,8 @@ pub(super) enum Shown {
     Mirrored(Mirror),
     /// A world that the facet steps by itself.
     Computed(Computing),
+    /// The frames of another session of this process.
+    Followed(Followed),
 }
 
 impl Shown {
@@ -38,6 +42,7 @@ impl Shown {
         match self {
             Shown::Mirrored(mirror) => mirror.world(),
             Shown::Computed(node) => node.simulation.world(),
+            Shown::Followed(followed) => followed.world(),
         }
     }
 
@@ -45,6 +50,15 @@ impl Shown {
         match self {
             Shown::Mirrored(mirror) => mirror.viewer(),
             Shown::Computed(node) => node.simulation.viewer(),
+            Shown::Followed(followed) => &followed.viewer,
+        }
+    }
+
+    /// Returns the simulated time of the frame, s.
+    pub fn time_s(&self) -> f64 {
+        match self {
+            Shown::Followed(followed) => followed.time_s,
+            _ => self.world().time(),
         }
     }
 
@@ -53,6 +67,7 @@ impl Shown {
         match self {
             Shown::Mirrored(mirror) => mirror.hash(),
             Shown::Computed(node) => node.hashes.as_ref().map_or([0; 16], |hashes| hashes.hash),
+            Shown::Followed(followed) => followed.hash,
         }
     }
 
@@ -60,6 +75,7 @@ impl Shown {
     pub fn wanted(&self, exact: bool) -> Content {
         match self {
             Shown::Computed(_) => Content::Inputs,
+            Shown::Followed(followed) => followed.content(),
             Shown::Mirrored(_) if exact => Content::Exact,
             Shown::Mirrored(_) => Content::Poses,
         }
@@ -67,13 +83,51 @@ impl Shown {
 
     /// Returns whether frames wait to be made.
     pub fn has_frames(&self) -> bool {
-        matches!(self, Shown::Computed(node) if !node.queue.is_empty())
+        match self {
+            Shown::Mirrored(_) => false,
+            Shown::Computed(node) => !node.queue.is_empty(),
+            Shown::Followed(followed) => !followed.queue.is_empty(),
+        }
+    }
+
+    /// Returns the frames of inputs that wait; `None` for a facet that gets states.
+    fn queue(&mut self) -> Option<&mut VecDeque<PendingState>> {
+        match self {
+            Shown::Mirrored(_) => None,
+            Shown::Computed(node) => Some(&mut node.queue),
+            Shown::Followed(followed) => (followed.content() == Content::Inputs).then_some(&mut followed.queue),
+        }
+    }
+
+    /// Returns the revision of the object table; `None` before the first one, and without one.
+    pub fn revision(&self) -> Option<u32> {
+        match self {
+            Shown::Mirrored(mirror) => mirror.revision(),
+            Shown::Computed(_) => None,
+            Shown::Followed(followed) => followed.revision,
+        }
+    }
+
+    /// Applies the object table of a snapshot.
+    pub fn apply_snapshot(&mut self, payload: &[u8]) -> Result<(), MessageError> {
+        match self {
+            Shown::Mirrored(mirror) => mirror.apply_snapshot(payload),
+            Shown::Followed(followed) if followed.content() != Content::Inputs => followed.apply_snapshot(payload),
+            Shown::Computed(_) | Shown::Followed(_) => Err(NO_MIRROR),
+        }
+    }
+
+    /// Returns whether the facet gets states.
+    pub fn gets_states(&self) -> bool {
+        !matches!(self.wanted(false), Content::Inputs)
     }
 
     /// Forgets the frames of a run.
     pub fn restart(&mut self) {
-        if let Shown::Computed(node) = self {
-            node.restart();
+        match self {
+            Shown::Mirrored(_) => {}
+            Shown::Computed(node) => node.restart(),
+            Shown::Followed(followed) => followed.queue.clear(),
         }
     }
 }
@@ -161,7 +215,7 @@ impl FacetSession {
     ) -> Result<(), MessageError> {
         self.last_received = now;
         let (live, newest) = (self.phase == Phase::Live, self.newest);
-        let Shown::Computed(node) = &mut self.content else {
+        let Some(queue) = self.content.queue() else {
             return Err(MessageError::Malformed("a world for a facet that does not step"));
         };
         if live && newest.is_some_and(|newest| !is_later(header.frame, newest)) {
@@ -169,7 +223,7 @@ impl FacetSession {
             self.repeat_answer(header.frame);
             return Ok(());
         }
-        node.queue.clear();
+        queue.clear();
         if let Some(newest) = newest.filter(|_| live) {
             self.counts.missing = self.counts.missing.wrapping_add(header.frame.wrapping_sub(newest) - 1);
         }
@@ -186,10 +240,10 @@ impl FacetSession {
         message: Message,
     ) -> Result<(), MessageError> {
         self.last_received = now;
-        let Shown::Computed(node) = &self.content else {
+        let Some(queue) = self.content.queue() else {
             return Err(MessageError::Malformed("inputs for a facet that does not step"));
         };
-        let full = node.queue.len() >= MAX_WAITING_FRAMES;
+        let full = queue.len() >= MAX_WAITING_FRAMES;
         match self.newest {
             Some(newest) if header.frame == newest => {
                 increment(&mut self.counts.duplicate);
@@ -208,8 +262,8 @@ impl FacetSession {
     fn queue_frame(&mut self, arrived: Duration, header: MessageHeader, message: Message) {
         self.newest = Some(header.frame);
         self.show |= self.drawn_frame.is_some();
-        if let Shown::Computed(node) = &mut self.content {
-            node.queue.push_back(PendingState { header, message, arrived });
+        if let Some(queue) = self.content.queue() {
+            queue.push_back(PendingState { header, message, arrived });
         }
     }
 }

@@ -12,6 +12,7 @@
 //! it before.
 
 mod computing;
+mod following;
 mod receiving;
 
 use super::input::Input;
@@ -22,6 +23,7 @@ use super::transport::{Delivery, LinkEvent, Message};
 use super::viewer::Viewer;
 use super::wire::{HEADER_BYTES, Hash, MessageHeader, MessageKind, is_later, message};
 use computing::Shown;
+pub use following::AppliedFrame;
 use std::collections::VecDeque;
 use std::time::Duration;
 use tumble_core::World;
@@ -200,6 +202,11 @@ impl FacetSession {
     /// Returns the world to draw after [`begin`](Self::begin).
     pub fn world(&self) -> &World {
         self.content.world()
+    }
+
+    /// Returns the simulated time of the last applied frame, s.
+    pub fn time_s(&self) -> f64 {
+        self.content.time_s()
     }
 
     /// Returns the users' heads and the cave's place in the scene.

@@ -6,11 +6,9 @@ use super::super::server::SyncMode;
 use super::super::table::Snapshot;
 use super::super::transport::Message;
 use super::super::wire::{HEADER_BYTES, MessageError, MessageHeader, MessageKind, VERSION, is_later, open};
-use super::computing::Shown;
+use super::computing::NO_MIRROR;
 use super::{EndReason, FacetSession, PendingState, Phase};
 use std::time::Duration;
-
-const NO_MIRROR: MessageError = MessageError::Malformed("poses for a facet that steps by itself");
 
 impl FacetSession {
     pub(super) fn on_message(&mut self, now: Duration, message: Message) {
@@ -92,13 +90,15 @@ impl FacetSession {
             increment(if listed == header.frame { &mut self.counts.duplicate } else { &mut self.counts.stale });
             return Ok(());
         }
-        let Shown::Mirrored(mirror) = &mut self.content else { return Err(NO_MIRROR) };
-        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == mirror.revision() {
+        if !self.content.gets_states() {
+            return Err(NO_MIRROR);
+        }
+        if self.phase == Phase::Live && Some(Snapshot::revision_of(payload)?) == self.content.revision() {
             increment(&mut self.counts.duplicate);
             return Ok(());
         }
-        mirror.apply_snapshot(payload)?;
-        let revision = mirror.revision();
+        self.content.apply_snapshot(payload)?;
+        let revision = self.content.revision();
         (self.phase, self.run, self.listed, self.lost, self.resynced) =
             (Phase::Live, header.run, Some(header.frame), false, None);
         if self.pending.take().is_some() {
@@ -112,8 +112,10 @@ impl FacetSession {
 
     fn on_state(&mut self, now: Duration, header: MessageHeader, message: Message) -> Result<(), MessageError> {
         self.last_received = now;
-        let Shown::Mirrored(mirror) = &self.content else { return Err(NO_MIRROR) };
-        if Some(Mirror::revision_of(&message[HEADER_BYTES..])?) == mirror.revision() {
+        if !self.content.gets_states() {
+            return Err(NO_MIRROR);
+        }
+        if Some(Mirror::revision_of(&message[HEADER_BYTES..])?) == self.content.revision() {
             self.take_state(PendingState { header, message, arrived: now });
             return Ok(());
         }

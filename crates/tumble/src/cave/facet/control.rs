@@ -21,12 +21,15 @@ const MAX_LINE_BYTES: u64 = 64;
 pub const PATTERN_MARK: &str = "pattern ";
 
 /// Conditions that end a facet, and its timeout.
+#[derive(Clone)]
 pub struct FacetControl {
     pub name: String,
     pub signals: Signals,
     pub reporter: Reporter,
     pub parent: Option<Parent>,
     pub connect_timeout: Duration,
+    /// Whether another facet of this process has failed, so that all end.
+    pub other_failed: Arc<AtomicBool>,
     /// Whether packets are authenticated. A server with another key file then does not answer.
     pub sealed: bool,
 }
@@ -51,7 +54,7 @@ impl FacetControl {
     }
 
     pub fn should_stop(&self) -> bool {
-        self.signals.stop_requested() || self.is_orphaned()
+        self.signals.stop_requested() || self.is_orphaned() || self.other_failed.load(Ordering::Relaxed)
     }
 }
 

@@ -5,8 +5,10 @@ mod burn_in;
 mod control;
 mod desktop;
 mod frame_log;
+mod group;
 mod painter;
 mod picture_watch;
+mod pictures;
 mod priority;
 mod render_thread;
 mod runner;
@@ -26,98 +28,211 @@ pub use control::PATTERN_MARK;
 use control::{FacetControl, POLL_INTERVAL, Parent};
 use desktop::{Desktop, Probe, desktop};
 use frame_log::{Earlier, FrameLog};
+use group::{LeaderFrame, Membership};
 use painter::Painter;
 use picture_watch::PictureWatch;
 pub use render_thread::draw_list;
 use render_thread::{RenderThread, slot_name};
 use runner::FacetRunner;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Facet, FacetOptions as SessionOptions, SyncMode};
 use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
 use tumble::scene::cave::{Facet as CaveFacet, Mode, Output, resolve_cave};
 use window::WindowSetup;
 
-/// Runs a facet until the end of the run.
+/// Runs a facet, or several in this process, until the end of the run.
 pub fn run(options: &FacetOptions) -> Result<(), Failure> {
-    let reporter = Reporter::start(options.parent_watch)?;
-    let outcome = show(options, &reporter);
+    let count = options.facet.len().max(1);
+    let reporters: Vec<Reporter> =
+        (0..count).map(|member| Reporter::start(options.parent_watch, member)).collect::<Result<_, _>>()?;
+    let outcome = show(options, &reporters);
     if let Err(failure) = &outcome {
-        reporter.line(failure.report());
+        reporters.iter().for_each(|reporter| reporter.line(failure.report()));
     }
-    reporter.flush();
+    reporters.iter().for_each(Reporter::flush);
     outcome
 }
 
-fn show(options: &FacetOptions, reporter: &Reporter) -> Result<(), Failure> {
+fn show(options: &FacetOptions, reporters: &[Reporter]) -> Result<(), Failure> {
     let signals = Signals::watch()?;
     let parent = options.parent_watch.then(Parent::watch).transpose()?;
     let compute = compute(options)?;
     let role = if compute == ComputeKind::Everywhere { Role::Server } else { Role::Facet };
     let setup = RunSetup::load(options.scene.load()?, &options.surroundings, role)?;
-    let description = options.facet.as_deref().map(|name| setup.cave.facet(name).cloned()).transpose()?;
-    let number = description
-        .as_ref()
-        .map_or(0, |facet| setup.cave.facets.iter().position(|f| f.name == facet.name).unwrap_or(0))
-        as FacetNumber;
-    let name = slot_name(description.as_ref()).to_owned();
-    let draw = &options.draw;
-    let in_memory = draw.no_pictures
-        || draw.offscreen
-        || options.web.web.is_some()
-        || description.as_ref().is_some_and(|f| f.output == Output::Offscreen);
-    let window_required = description.as_ref().is_some_and(|f| f.window_required);
-    let mut desktop = if in_memory { None } else { reach_desktop(&name, window_required)? };
-    let offscreen = desktop.is_none();
-    let (mut painter, mut window_setup) = (None, None);
-    match (draw.no_pictures, offscreen) {
-        (true, _) => {}
-        (false, true) => {
-            painter = Some(match web_screen(options, &setup, description.as_ref(), reporter)? {
-                Some(screen) => Painter::Browsers(Box::new(screen)),
-                None => {
-                    let (facet, overlays) = (description.as_ref(), draw.debug_draw.draw);
-                    Painter::Memory(Box::new(RenderThread::new(&setup, facet, draw.quality, overlays)?))
-                }
-            })
-        }
-        (false, false) => {
-            window_setup = Some(WindowSetup::new(&setup, description.as_ref(), draw.quality, draw.debug_draw.draw)?)
-        }
-    }
-    let mut control = FacetControl {
-        name: name.clone(),
+    let facets = facets(options, &setup)?;
+    let control = FacetControl {
+        name: slot_name(facets.first()).to_owned(),
         signals,
-        reporter: reporter.clone(),
+        reporter: reporters[0].clone(), // there is one for each facet, and for the preview
         parent,
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
+        other_failed: Arc::default(),
         sealed: false,
     };
+    let (painters, mut window) = painters(options, &setup, &facets, &control)?;
     let server = find_server(options, &setup, &control)?;
-    control.sealed = setup.cave.security.is_some() && matches!(server.address, ServerAddress::Udp(_));
-    let again = options.server.is_none() && options.run.is_none();
-    let link = FacetEndpoint::open(&server, number, &setup, again)?;
-    let session_options = session_options(&setup, &name)?;
-    let log = frame_log(options, &name, reporter)?;
-    let facet = match compute {
-        ComputeKind::Server => Facet::new(link, session_options, setup.world),
-        ComputeKind::Everywhere => {
-            let simulation = CaveSimulation::new(&setup, setup.world.fork(), options.user_colliders)?
-                .disturbed(options.disturb_after);
-            let hash = simulation.hash(&setup)?;
-            Facet::computing(link, SessionOptions { scene: hash, ..session_options }, Box::new(simulation))
+    let sealed = setup.cave.security.is_some() && matches!(server.address, ServerAddress::Udp(_));
+    let control = FacetControl { sealed, ..control };
+    let applied = Arc::new(LeaderFrame::default());
+    let mut runners = Vec::with_capacity(painters.len());
+    for (k, painter) in painters.into_iter().enumerate() {
+        let membership = match k {
+            _ if facets.len() < 2 => Membership::Alone,
+            0 => Membership::Leader(applied.clone()),
+            _ => Membership::Follower(applied.clone()),
+        };
+        let name = slot_name(facets.get(k)).to_owned();
+        let control = FacetControl { name, reporter: reporters[k].clone(), ..control.clone() };
+        let session = session(options, &setup, facets.get(k), &server, (compute, &membership))?;
+        runners.push(runner(options, session, membership, painter, control)?);
+    }
+    match (window.take(), &mut runners[..]) {
+        (Some((window_setup, probe)), [runner]) => {
+            let shown = window_setup.show(runner, options.draw.burn_in, Some(probe));
+            finish(runner, shown)
         }
+        (_, [runner]) => {
+            let shown = runner.run_offscreen();
+            finish(runner, shown)
+        }
+        (_, several) => together(several, &control.other_failed),
+    }
+}
+
+/// Returns the facets of this process; none for the preview.
+fn facets(options: &FacetOptions, setup: &RunSetup) -> Result<Vec<CaveFacet>, Failure> {
+    let facets: Vec<CaveFacet> =
+        options.facet.iter().map(|name| setup.cave.facet(name).cloned()).collect::<Result<_, _>>()?;
+    let [first, others @ ..] = &facets[..] else { return Ok(facets) };
+    for (k, facet) in others.iter().enumerate() {
+        let wrong = |why: &str| {
+            Failure::input(format!(
+                "--facet {}: facets {} and {} {why}",
+                options.facet.join(","),
+                first.name,
+                facet.name
+            ))
+        };
+        if facets[..=k].iter().any(|other| other.name == facet.name) {
+            return Err(Failure::input(format!("--facet {}: {} is named twice", options.facet.join(","), facet.name)));
+        }
+        if facet.display.gpu != first.display.gpu {
+            return Err(wrong("have another `gpu`, so each needs a process of its own"));
+        }
+        if options.web.web.is_some() {
+            return Err(wrong("are served to browsers by a process each (--web)"));
+        }
+    }
+    Ok(facets)
+}
+
+/// The painters of the facets of this process; `None` for one that draws nothing, or in a window.
+type Painters = Vec<Option<Painter>>;
+
+/// Prepares what draws the facets, or the window of the only one.
+fn painters(
+    options: &FacetOptions,
+    setup: &RunSetup,
+    facets: &[CaveFacet],
+    control: &FacetControl,
+) -> Result<(Painters, Option<(WindowSetup, Probe)>), Failure> {
+    let draw = &options.draw;
+    let (quality, overlays) = (draw.quality, draw.debug_draw.draw);
+    if draw.no_pictures {
+        return Ok((facets.iter().map(|_| None).chain(facets.is_empty().then_some(None)).collect(), None));
+    }
+    let first = facets.first();
+    let in_memory = |facet: &CaveFacet| facet.output == Output::Offscreen;
+    let in_memory = draw.offscreen || options.web.web.is_some() || !facets.is_empty() && facets.iter().all(in_memory);
+    let window_required = facets.iter().any(|f| f.window_required);
+    if let Some(probe) = if in_memory { None } else { reach_desktop(&control.name, window_required)? } {
+        if facets.len() > 1 {
+            let names = options.facet.join(",");
+            let why = "several facets of one process draw into memory; use --offscreen or output = \"offscreen\", or a process for each window";
+            return Err(Failure::input(format!("--facet {names}: {why}")));
+        }
+        return Ok((vec![None], Some((WindowSetup::new(setup, first, quality, overlays)?, probe))));
+    }
+    if let Some(screen) = web_screen(options, setup, first, &control.reporter)? {
+        return Ok((vec![Some(Painter::Browsers(Box::new(screen)))], None));
+    }
+    let thread = RenderThread::new(setup, facets, quality, overlays)?;
+    let other = |pictures| Some(Painter::Other { pictures, adapter: thread.adapter().to_owned() });
+    let others: Vec<_> = thread.others().iter().cloned().map(other).collect();
+    Ok((std::iter::once(Some(Painter::Memory(Box::new(thread)))).chain(others).collect(), None))
+}
+
+/// Connects a facet to the server.
+fn session(
+    options: &FacetOptions,
+    setup: &RunSetup,
+    facet: Option<&CaveFacet>,
+    server: &RunServer,
+    (compute, membership): (ComputeKind, &Membership),
+) -> Result<Facet<FacetEndpoint>, Failure> {
+    let number = facet.and_then(|facet| setup.cave.facets.iter().position(|f| f.name == facet.name)).unwrap_or(0);
+    let again = options.server.is_none() && options.run.is_none();
+    let link = FacetEndpoint::open(server, number as FacetNumber, setup, again)?;
+    let of_facet = session_options(setup, slot_name(facet))?;
+    // only the leader of several facets has a world
+    let world = || setup.world.fork();
+    let follows = matches!(membership, Membership::Follower(_));
+    let everywhere = compute == ComputeKind::Everywhere;
+    if !everywhere {
+        return match follows {
+            false => Ok(Facet::new(link, of_facet, world())),
+            true => Facet::following(link, of_facet, false).map_err(|e| Failure::run("the facet", e)),
+        };
+    }
+    let simulation = CaveSimulation::new(setup, world(), options.user_colliders)?.disturbed(options.disturb_after);
+    let of_facet = SessionOptions { scene: simulation.hash(setup)?, ..of_facet };
+    match follows {
+        false => Ok(Facet::computing(link, of_facet, Box::new(simulation))),
+        true => Facet::following(link, of_facet, true).map_err(|e| Failure::run("the facet", e)),
+    }
+}
+
+fn runner(
+    options: &FacetOptions,
+    session: Facet<FacetEndpoint>,
+    membership: Membership,
+    painter: Option<Painter>,
+    control: FacetControl,
+) -> Result<FacetRunner, Failure> {
+    let log = frame_log(options, &control.name, &control.reporter)?;
+    let reporter = control.reporter.clone();
+    let watch = options.draw.watch_pictures.then(|| PictureWatch::new(reporter.clone()));
+    Ok(FacetRunner::new(session, membership, painter, log, options.draw.burn_in, control, reporter, watch))
+}
+
+/// Runs several facets, each in a thread. If one fails, all end.
+fn together(runners: &mut [FacetRunner], other_failed: &AtomicBool) -> Result<(), Failure> {
+    let run = |runner: &mut FacetRunner| {
+        let shown = runner.run_offscreen();
+        if shown.is_err() {
+            other_failed.store(true, Ordering::Relaxed);
+        }
+        finish(runner, shown)
     };
-    let watch = draw.watch_pictures.then(|| PictureWatch::new(reporter.clone()));
-    let mut runner = FacetRunner::new(facet, painter, log, draw.burn_in, control, reporter.clone(), watch);
-    let outcome = match window_setup {
-        Some(window_setup) => window_setup.show(&mut runner, draw.burn_in, desktop.take()),
-        None => runner.run_offscreen(),
-    };
+    let outcomes: Vec<Result<(), Failure>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = runners.iter_mut().map(|runner| scope.spawn(|| run(runner))).collect();
+        let joined = |thread: std::thread::ScopedJoinHandle<'_, _>| {
+            thread.join().unwrap_or_else(|_| Err(Failure::run("the facets", "a thread has ended")))
+        };
+        threads.into_iter().map(joined).collect()
+    });
+    outcomes.into_iter().collect()
+}
+
+/// Leaves the run and completes the files of a facet.
+fn finish(runner: &mut FacetRunner, shown: Result<(), Failure>) -> Result<(), Failure> {
     // in any case, the server need not wait for the timeout
     let _ = runner.facet.leave();
     // a write error is the cause of other errors
     let written = runner.log.as_mut().map_or(Ok(()), FrameLog::finish);
-    written.and(outcome)
+    written.and(shown)
 }
 
 /// Serves the facet to browsers if the options say so.

@@ -1,5 +1,7 @@
-//! The painter of a facet without a window: a thread of this process, or web browsers.
+//! The painter of a facet without a window: a thread of this process, also for several facets, or web
+//! browsers.
 
+use super::pictures::Pictures;
 use super::render_thread::RenderThread;
 use crate::cave::web::WebScreen;
 use crate::failure::Failure;
@@ -12,6 +14,13 @@ use tumble::render::{CalibrationPattern, Image};
 pub enum Painter {
     /// Into memory.
     Memory(Box<RenderThread>),
+    /// By the painter of another facet of this process.
+    Other {
+        /// Its pictures.
+        pictures: Pictures,
+        /// The graphics adapter.
+        adapter: String,
+    },
     /// On the screens of browsers, which keep their pictures.
     Browsers(Box<WebScreen>),
 }
@@ -21,7 +30,7 @@ impl Painter {
     pub fn is_software(&self) -> bool {
         match self {
             Painter::Memory(thread) => thread.is_software(),
-            Painter::Browsers(_) => false,
+            Painter::Other { .. } | Painter::Browsers(_) => false,
         }
     }
 
@@ -29,6 +38,7 @@ impl Painter {
     pub fn adapter(&self) -> &str {
         match self {
             Painter::Memory(thread) => thread.adapter(),
+            Painter::Other { adapter, .. } => adapter,
             Painter::Browsers(_) => "",
         }
     }
@@ -45,6 +55,10 @@ impl Painter {
     ) -> Result<(), Failure> {
         match self {
             Painter::Memory(thread) => thread.begin(world, viewer, frame, burn_in, pattern),
+            Painter::Other { pictures, .. } => {
+                pictures.want(frame);
+                Ok(())
+            }
             Painter::Browsers(screen) => screen.begin(world, viewer, frame),
         }
     }
@@ -53,6 +67,7 @@ impl Painter {
     pub fn finished(&mut self, timeout: Duration) -> Result<Option<Option<Image>>, Failure> {
         match self {
             Painter::Memory(thread) => Ok(thread.finished(timeout)?.map(Some)),
+            Painter::Other { pictures, .. } => Ok(pictures.take(timeout)?.map(Some)),
             Painter::Browsers(screen) => Ok(screen.is_finished(timeout).then_some(None)),
         }
     }

@@ -1,15 +1,15 @@
-//! Draws a facet into memory in a thread of its own, so that the session answers the server however
-//! long a picture takes.
+//! Draws facets into memory in a thread of its own, so that the sessions answer the server however
+//! long a picture takes. All facets of a process share device, draw list and uploads.
 
-use super::burn_in::burn_in;
+use super::pictures::{Picture, Pictures};
 use crate::cave::run_setup::{PREVIEW, RunSetup, apply_viewer};
 use crate::failure::Failure;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
 use tumble::render::{
-    CalibrationPattern, CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer,
+    CalibrationPattern, CaveView, DebugDraw, DrawList, Drawing, Image, Quality, RenderError, Renderer, Stage,
     finished_calibration_picture,
 };
 use tumble::scene::cave::Facet;
@@ -19,7 +19,7 @@ const CAVE_SHADOW_MAP_PX: u32 = 4096;
 /// Maximum size of the picture of an unfolded cave, pixels.
 pub const PREVIEW_PX: [u32; 2] = [1280, 960];
 
-/// Request for a picture.
+/// Request for the pictures of a frame.
 struct RenderRequest {
     list: DrawList,
     viewer: Viewer,
@@ -28,34 +28,48 @@ struct RenderRequest {
     pattern: Option<CalibrationPattern>,
 }
 
+/// What is drawn, and who gets it.
+struct Canvas {
+    /// `None` for all facets unfolded.
+    facet: Option<Facet>,
+    pictures: Pictures,
+}
+
 /// Makes draw lists in the calling thread and pictures in its own.
 pub struct RenderThread {
     drawing: Drawing,
     quality: Option<Quality>,
     overlays: DebugDraw,
     requests: SyncSender<RenderRequest>,
-    pictures: Receiver<Result<Image, RenderError>>,
+    /// Of the first facet.
+    pictures: Pictures,
+    /// Of the other facets.
+    others: Vec<Pictures>,
     software: bool,
     adapter: String,
 }
 
 impl RenderThread {
-    /// Starts the thread for a facet, or for all facets unfolded if there is none.
+    /// Starts the thread for facets with one adapter, or for all facets unfolded if there is none.
     pub fn new(
         setup: &RunSetup,
-        facet: Option<&Facet>,
+        facets: &[Facet],
         quality: Option<Quality>,
         overlays: DebugDraw,
     ) -> Result<RenderThread, Failure> {
-        let (view, facet) = (setup.view()?, facet.cloned());
+        let view = setup.view()?;
+        let gpu = facets.first().and_then(|facet| facet.display.gpu.clone());
+        let shown: Vec<Option<Facet>> =
+            if facets.is_empty() { vec![None] } else { facets.iter().cloned().map(Some).collect() };
+        let canvases: Vec<Canvas> =
+            shown.into_iter().map(|facet| Canvas { facet, pictures: Pictures::default() }).collect();
+        let all: Vec<Pictures> = canvases.iter().map(|canvas| canvas.pictures.clone()).collect();
         let (requests, incoming) = sync_channel::<RenderRequest>(1);
-        let (done, pictures) = sync_channel(1);
         let (ready, started) = sync_channel(1);
         std::thread::Builder::new()
             .name("painter".into())
             .spawn(move || {
-                let gpu = facet.as_ref().and_then(|facet| facet.display.gpu.as_deref());
-                let mut renderer = match Renderer::with_adapter(gpu) {
+                let mut renderer = match Renderer::with_adapter(gpu.as_deref()) {
                     Ok(renderer) => renderer,
                     Err(error) => {
                         let _ = ready.send(Err(error));
@@ -63,7 +77,7 @@ impl RenderThread {
                     }
                 };
                 let _ = ready.send(Ok((renderer.is_software(), renderer.adapter().to_owned())));
-                render_all(view, facet, &mut renderer, &incoming, &done);
+                render_all(view, &canvases, &mut renderer, &incoming);
             })
             .map_err(|e| Failure::run("drawing", e))?;
         let (software, adapter) =
@@ -75,14 +89,23 @@ impl RenderThread {
             quality,
             overlays,
             requests,
-            pictures,
+            pictures: all[0].clone(), // one for each canvas, and there is at least one
+            others: all[1..].to_vec(),
             software,
             adapter,
         };
-        // the first picture takes seconds to compile pipelines, and nothing waits for it yet
+        // the first pictures take seconds to compile pipelines, and nothing waits for them yet
         render_thread.begin(&setup.world, &setup.viewer()?, 0, false, None)?;
-        while render_thread.finished(Duration::from_secs(1))?.is_none() {}
+        for pictures in &all {
+            pictures.want(0);
+            while pictures.take(Duration::from_secs(1))?.is_none() {}
+        }
         Ok(render_thread)
+    }
+
+    /// Returns the pictures of the facets but the first.
+    pub fn others(&self) -> &[Pictures] {
+        &self.others
     }
 
     /// Returns whether a software driver draws.
@@ -95,8 +118,8 @@ impl RenderThread {
         &self.adapter
     }
 
-    /// Starts a picture of the world, or of a calibration pattern, with the frame number in it for
-    /// `burn_in`.
+    /// Starts the pictures of the world, or of a calibration pattern, with the frame number in them for
+    /// `burn_in`, and asks for that of the first facet.
     pub fn begin(
         &mut self,
         world: &World,
@@ -106,18 +129,15 @@ impl RenderThread {
         pattern: Option<CalibrationPattern>,
     ) -> Result<(), Failure> {
         let list = draw_list(&mut self.drawing, world, self.quality.as_ref(), &self.overlays)?;
+        self.pictures.want(frame);
         self.requests
             .send(RenderRequest { list, viewer: viewer.clone(), frame, burn_in, pattern })
             .map_err(|_| Failure::run("drawing", "the render thread has ended"))
     }
 
-    /// Returns the picture if it is finished within `timeout`.
+    /// Returns the picture of the first facet if it is finished within `timeout`.
     pub fn finished(&mut self, timeout: Duration) -> Result<Option<Image>, Failure> {
-        match self.pictures.recv_timeout(timeout) {
-            Ok(image) => image.map(Some).map_err(|e| Failure::run("drawing", e)),
-            Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => Err(Failure::run("drawing", "the render thread has ended")),
-        }
+        self.pictures.take(timeout)
     }
 }
 
@@ -138,27 +158,40 @@ pub fn draw_list(
     Ok(list)
 }
 
-fn render_all(
-    mut view: CaveView,
-    facet: Option<Facet>,
-    renderer: &mut Renderer,
-    incoming: &Receiver<RenderRequest>,
-    done: &SyncSender<Result<Image, RenderError>>,
-) {
+fn render_all(mut view: CaveView, canvases: &[Canvas], renderer: &mut Renderer, incoming: &Receiver<RenderRequest>) {
     while let Ok(request) = incoming.recv() {
         apply_viewer(&mut view, &request.viewer, request.frame);
-        let mut image = match (&facet, request.pattern) {
-            (Some(facet), Some(pattern)) => Ok(finished_calibration_picture(&view, facet, pattern)),
-            (Some(facet), None) => view.draw(renderer, &request.list, facet),
-            (None, _) => view.draw_unfolded(renderer, &request.list, PREVIEW_PX),
+        let text = |error: RenderError| error.to_string();
+        let stage = renderer.stage(&request.list).map_err(text);
+        let draw = |canvas: &Canvas| {
+            let stage = stage.as_ref().map_err(String::clone)?;
+            draw(&view, renderer, stage, canvas.facet.as_ref(), request.pattern).map_err(text)
         };
-        if let (Ok(image), true) = (&mut image, request.burn_in) {
-            burn_in(image, request.frame);
-        }
-        if done.send(image).is_err() {
-            return;
+        // the device draws the next picture while the last one is copied
+        let drawn: Vec<_> = canvases.iter().map(draw).collect();
+        for (canvas, picture) in canvases.iter().zip(drawn) {
+            canvas.pictures.put(request.frame, request.burn_in, picture.and_then(|p| p.wait().map_err(text)));
         }
     }
+    canvases.iter().for_each(|canvas| canvas.pictures.end());
+}
+
+/// Draws a facet, or all unfolded, and begins to copy the picture.
+fn draw(
+    view: &CaveView,
+    renderer: &mut Renderer,
+    stage: &Stage,
+    facet: Option<&Facet>,
+    pattern: Option<CalibrationPattern>,
+) -> Result<Picture, RenderError> {
+    match (facet, pattern) {
+        (Some(facet), Some(pattern)) => {
+            return Ok(Picture::Image(finished_calibration_picture(view, facet, pattern)));
+        }
+        (Some(facet), None) => view.draw_on_device(renderer, stage, facet)?,
+        (None, _) => view.draw_unfolded_on_device(renderer, stage, PREVIEW_PX)?,
+    }
+    renderer.begin_read().map(Picture::Reading)
 }
 
 /// Returns the first 16 bytes of the BLAKE3 hash of a picture's pixels.

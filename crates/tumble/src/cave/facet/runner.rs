@@ -2,6 +2,7 @@
 
 use super::control::{FacetControl, POLL_INTERVAL, ServerWait};
 use super::frame_log::FrameLog;
+use super::group::Membership;
 use super::painter::Painter;
 use super::picture_watch::PictureWatch;
 use super::priority;
@@ -9,6 +10,7 @@ use super::render_thread::image_hash;
 use crate::cave::endpoints::FacetEndpoint;
 use crate::cave::facet_report::Reporter;
 use crate::failure::Failure;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tumble::net::sync::{EndReason, Facet, SessionError, Task};
 use tumble::render::{CalibrationPattern, Image};
@@ -19,6 +21,7 @@ const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
 /// A facet that is connected or looks for its server.
 pub struct FacetRunner {
     pub facet: Facet<FacetEndpoint>,
+    membership: Membership,
     painter: Option<Painter>,
     pub log: Option<FrameLog>,
     burn_in: bool,
@@ -48,6 +51,7 @@ impl FacetRunner {
     /// Creates a facet that has drawn nothing.
     pub fn new(
         facet: Facet<FacetEndpoint>,
+        membership: Membership,
         painter: Option<Painter>,
         log: Option<FrameLog>,
         burn_in: bool,
@@ -58,6 +62,7 @@ impl FacetRunner {
         let server_wait = ServerWait::default();
         FacetRunner {
             facet,
+            membership,
             painter,
             log,
             burn_in,
@@ -86,7 +91,7 @@ impl FacetRunner {
         if self.control.is_orphaned() {
             return Err(Failure::run(&self.control.title(), "its launcher has ended"));
         }
-        if self.control.signals.stop_requested() {
+        if self.control.signals.stop_requested() || self.control.other_failed.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let task = self.facet.next(timeout).map_err(failed)?;
@@ -139,8 +144,8 @@ impl FacetRunner {
     }
 
     fn draw(&mut self) -> Result<(), Failure> {
-        let Some(frame) = self.facet.begin() else { return Ok(()) };
-        let time_s = self.facet.world().time();
+        let Some(frame) = self.membership.begin(&mut self.facet) else { return Ok(()) };
+        let time_s = self.facet.session().time_s();
         match &mut self.painter {
             Some(painter) => {
                 let pattern = self.control.pattern();

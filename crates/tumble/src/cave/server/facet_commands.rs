@@ -65,21 +65,43 @@ pub fn web_addresses(launcher: &CaveOptions, cave: &Cave) -> Result<BTreeMap<Str
     (0..).zip(all.into_iter().filter(chosen)).map(one).collect()
 }
 
-/// Returns the arguments of a facet's process; `web` is the address at which it serves browsers, and
+/// Returns the facets of a run by process: those with one `process` on a node, or, with --one-process, all of
+/// a node with one adapter. Facets that browsers show have processes of their own.
+pub fn processes(cave: &Cave, launcher: Option<&CaveOptions>, web: &BTreeMap<String, SocketAddr>) -> Vec<Vec<usize>> {
+    if launcher.is_some_and(|launcher| launcher.preview) {
+        return vec![vec![0]];
+    }
+    let one_process = launcher.is_some_and(|launcher| launcher.one_process);
+    let with = |a: &Facet, b: &Facet| {
+        let same =
+            if one_process { a.display.gpu == b.display.gpu } else { a.process.is_some() && a.process == b.process };
+        same && a.node == b.node && [a, b].iter().all(|facet| !web.contains_key(&facet.name))
+    };
+    let mut processes: Vec<Vec<usize>> = Vec::new();
+    for (k, facet) in cave.facets.iter().enumerate() {
+        match processes.iter_mut().find(|members| with(&cave.facets[members[0]], facet)) {
+            Some(members) => members.push(k),
+            None => processes.push(vec![k]),
+        }
+    }
+    processes
+}
+
+/// Returns the arguments of a process with these facets; `web` is the address at which it serves browsers, and
 /// `again` says that it is started again.
 pub fn facet_args(
     launcher: &CaveOptions,
-    name: &str,
+    names: &[&str],
     address: &ServerAddress,
     web: Option<&SocketAddr>,
     again: bool,
 ) -> Vec<String> {
     let mut args = vec!["facet".to_owned()];
     args.extend(scene_args(&launcher.serve));
-    if name == PREVIEW && launcher.preview {
+    if launcher.preview {
         args.push("--preview".into())
     } else {
-        args.extend(["--facet".into(), name.to_owned()])
+        args.extend(["--facet".into(), names.join(",")])
     }
     args.extend(match address {
         ServerAddress::Memory(run) => ["--run".into(), run.clone()],
@@ -107,7 +129,7 @@ pub fn facet_args(
         ("--overwrite", draw.overwrite && !again),
         ("--continue-frames", again),
         ("--burn-in", draw.burn_in),
-        ("--offscreen", draw.offscreen),
+        ("--offscreen", draw.offscreen || launcher.one_process),
         ("--no-pictures", draw.no_pictures),
         ("--watch-pictures", launcher.serve.console.is_some() && !draw.no_pictures),
     ];

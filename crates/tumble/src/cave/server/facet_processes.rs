@@ -1,7 +1,9 @@
 //! The processes of a run's facets. Those of this machine, and of nodes with a launch command, are
 //! started, monitored and ended. For all others the command line is printed.
 
-use super::facet_commands::{address_for, facet_args, launch, scene_args, shell_quoted, slots, web_addresses};
+use super::facet_commands::{
+    address_for, facet_args, launch, processes, scene_args, shell_quoted, slots, web_addresses,
+};
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
 use crate::cave::facet::PATTERN_MARK;
@@ -53,9 +55,17 @@ pub struct FacetProcesses {
     pattern: Option<String>,
 }
 
-struct FacetProcess {
+/// A facet of a process.
+struct Member {
     slot: FacetNumber,
     name: String,
+    /// Frames written by earlier processes of this facet.
+    written_before: u64,
+}
+
+struct FacetProcess {
+    /// At least one.
+    members: Vec<Member>,
     /// Program and arguments of the first start.
     command: Vec<OsString>,
     /// The same of further starts.
@@ -64,8 +74,6 @@ struct FacetProcess {
     /// Start of the process.
     began: Option<Instant>,
     reports: Option<ReportReader>,
-    /// Frames written by earlier processes of this facet.
-    written_before: u64,
     ended: Option<Instant>,
     /// Ended for good: closed by the user, or failed too often.
     over: bool,
@@ -109,6 +117,7 @@ impl FacetProcesses {
         signals: &Signals,
     ) -> Result<FacetProcesses, Failure> {
         let web = launcher.map_or(Ok(BTreeMap::new()), |launcher| web_addresses(launcher, cave))?;
+        let groups = processes(cave, launcher, &web);
         let mut processes = FacetProcesses {
             processes: Vec::new(),
             restart: launcher.is_some_and(|l| l.restart),
@@ -117,8 +126,13 @@ impl FacetProcesses {
             web_key: launcher.and_then(|launcher| launcher.web.drawn_key.clone()),
             pattern: None,
         };
-        for (k, slot) in slots(cave, launcher.is_some_and(|l| l.preview)).into_iter().enumerate() {
-            let remote = cave.facets.get(k).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
+        let slots = slots(cave, launcher.is_some_and(|l| l.preview));
+        for group in groups {
+            let names: Vec<&str> = group.iter().map(|&k| slots[k].name.as_str()).collect();
+            let members = || group.iter().map(|&k| (k, slots[k].name.as_str()));
+            let title = title(&names);
+            let remote =
+                cave.facets.get(group[0]).and_then(|f| f.node).map(|n| &cave.nodes[n]).filter(|n| !n.is_local());
             let server_address = remote.map_or_else(|| Some(address.clone()), |node| address_for(node, address));
             match (launcher, remote) {
                 (Some(_), Some(node)) if server_address.is_none() && !node.launch.is_empty() => {
@@ -131,25 +145,24 @@ impl FacetProcesses {
                 (Some(launcher), None) => {
                     let program = std::env::current_exe().map_err(|e| Failure::run("starting a facet", e))?;
                     let command = |again| {
-                        let words = facet_args(launcher, &slot.name, address, web.get(&slot.name), again)
+                        let words = facet_args(launcher, &names, address, web.get(names[0]), again)
                             .into_iter()
                             .map(OsString::from);
                         std::iter::once(program.clone().into_os_string()).chain(words).collect()
                     };
-                    processes.processes.push(FacetProcess::new(k, &slot.name, command));
+                    processes.processes.push(FacetProcess::new(members(), command));
                 }
                 (Some(launcher), Some(node)) if !node.launch.is_empty() => {
                     let server = server_address.as_ref().unwrap_or(address);
                     let words =
-                        |again| launch(node, &slot.name, &facet_args(launcher, &slot.name, server, None, again));
+                        |again| launch(node, &names.join(","), &facet_args(launcher, &names, server, None, again));
                     processes.report(&format!(
-                        "facet {}: starting it on {}: {}",
-                        slot.name,
+                        "{title}: starting it on {}: {}",
                         node.name,
                         words(false).iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
                     ));
                     let command = |again| words(again).into_iter().map(OsString::from).collect();
-                    processes.processes.push(FacetProcess::new(k, &slot.name, command));
+                    processes.processes.push(FacetProcess::new(members(), command));
                 }
                 (_, node) => {
                     let server = match (&server_address, address) {
@@ -162,9 +175,8 @@ impl FacetProcesses {
                     let place = node.map_or("here".to_owned(), |n| format!("on {} ({})", n.name, n.address));
                     let what = scene_args(serve).iter().map(|a| shell_quoted(a)).collect::<Vec<_>>().join(" ");
                     processes.report(&format!(
-                        "facet {}: start it {place}: tumble facet {what} --facet {}{server}",
-                        slot.name,
-                        shell_quoted(&slot.name)
+                        "{title}: start it {place}: tumble facet {what} --facet {}{server}",
+                        shell_quoted(&names.join(","))
                     ));
                 }
             }
@@ -183,9 +195,9 @@ impl FacetProcesses {
             let process = &mut self.processes[k];
             if let Some(status) = process.poll_exit(&self.signals) {
                 process.ended = Some(Instant::now());
-                ended.push(process.slot);
+                ended.extend(process.members.iter().map(|member| member.slot));
                 process.over = status.success() || !self.restart;
-                let title = format!("facet {}", process.name);
+                let title = process.title();
                 if joining {
                     return Err(Failure::run(
                         &title,
@@ -209,8 +221,8 @@ impl FacetProcesses {
                 if process.restarts.len() >= MAX_RESTARTS {
                     (process.over, process.given_up) = (true, true);
                     let text = format!(
-                        "facet {} ended {MAX_RESTARTS} times within a minute and is not started again",
-                        process.name
+                        "{} ended {MAX_RESTARTS} times within a minute and is not started again",
+                        process.title()
                     );
                     self.report(&text);
                     continue;
@@ -235,7 +247,8 @@ impl FacetProcesses {
     /// Returns the names of the facets that prepare to join: those that report it, and those that
     /// were started a moment ago and have not reported yet.
     pub fn preparing(&self) -> Vec<&str> {
-        self.processes.iter().filter(|process| process.is_preparing()).map(|process| process.name.as_str()).collect()
+        let members = self.processes.iter().filter(|process| process.is_preparing()).flat_map(|p| &p.members);
+        members.map(|member| member.name.as_str()).collect()
     }
 
     /// Waits for the facets after END, and kills those that do not end. A facet that writes frames
@@ -248,18 +261,19 @@ impl FacetProcesses {
     pub fn end(&mut self, started: bool) -> Result<(), Failure> {
         self.wait(if started { EXIT_TIMEOUT } else { FINAL_EXIT_TIMEOUT / 2 });
         let mut faults: Vec<String> =
-            self.processes.iter().filter_map(|m| Some(format!("{} ({})", m.name, m.fault()?))).collect();
+            self.processes.iter().filter_map(|m| Some(format!("{} ({})", m.names(), m.fault()?))).collect();
         // a facet that missed END finds its pipe closed
         self.processes.iter_mut().filter_map(|m| m.child.as_mut()).for_each(|child| drop(child.stdin.take()));
         self.wait(FINAL_EXIT_TIMEOUT);
         // all are killed before any is waited for: graphics drivers take time to release a process
         for process in &mut self.processes {
-            let waiting = process.received().report.waiting;
+            let waiting: u64 = process.received().map(|received| received.report.waiting).sum();
+            let (title, names) = (process.title(), process.names());
             let Some(child) = &mut process.child else { continue };
             if let Ok(None) = child.try_wait() {
-                eprintln!("facet {}: does not end and was killed", process.name);
+                eprintln!("{title}: does not end and was killed");
                 if waiting > 0 {
-                    faults.push(format!("{} ({waiting} shown frames are not written)", process.name));
+                    faults.push(format!("{names} ({waiting} shown frames are not written)"));
                 }
             }
             let _ = child.kill();
@@ -295,11 +309,16 @@ impl FacetProcesses {
 
     /// Returns the messages and the small pictures of the facets since the last call.
     pub fn messages(&self) -> Vec<(FacetNumber, VecDeque<String>, Option<Vec<u8>>)> {
-        let of = |process: &FacetProcess| {
-            let (lines, picture) = process.reports.as_ref()?.take_messages();
-            (!lines.is_empty() || picture.is_some()).then_some((process.slot, lines, picture))
+        let of = |(process, k, member): (&FacetProcess, usize, &Member)| {
+            let (lines, picture) = process.reports.as_ref()?.take_messages(k);
+            (!lines.is_empty() || picture.is_some()).then_some((member.slot, lines, picture))
         };
-        self.processes.iter().filter_map(of).collect()
+        self.members().filter_map(of).collect()
+    }
+
+    /// Returns all facets, with their processes and their numbers in these.
+    fn members(&self) -> impl Iterator<Item = (&FacetProcess, usize, &Member)> {
+        self.processes.iter().flat_map(|process| process.members.iter().enumerate().map(move |(k, m)| (process, k, m)))
     }
 
     /// Has all facets show a calibration pattern, or `off` for the scene. A facet that is started again
@@ -321,17 +340,17 @@ impl FacetProcesses {
 
     /// Returns the last report of the facet in a slot; an empty one if this process did not start it.
     pub fn report_of(&self, slot: FacetNumber) -> FacetReport {
-        let process = self.processes.iter().find(|process| process.slot == slot);
-        process.map_or_else(FacetReport::default, |process| process.received().report)
+        let found = self.members().find(|(_, _, member)| member.slot == slot);
+        found.map_or_else(FacetReport::default, |(process, k, _)| process.received_of(k).report)
     }
 
     /// Returns by slot how many frames have been written; `None` for a facet that this process did
     /// not start.
     pub fn written(&self, slots: usize) -> Vec<Option<u64>> {
         let mut written = vec![None; slots];
-        for process in &self.processes {
-            if let Some(entry) = written.get_mut(process.slot as usize) {
-                *entry = Some(process.written());
+        for (process, k, member) in self.members() {
+            if let Some(entry) = written.get_mut(member.slot as usize) {
+                *entry = Some(process.written(k));
             }
         }
         written
@@ -345,15 +364,18 @@ impl FacetProcesses {
         // a group of its own, because Ctrl-C is for the launcher, which ends the run in order
         command.args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
         command.envs(self.web_key.iter().map(|key| (KEY_VARIABLE, key)));
-        let failed = |e: std::io::Error| Failure::run(&format!("starting facet {}", process.name), e);
+        let title = process.title();
+        let failed = |e: std::io::Error| Failure::run(&format!("starting {title}"), e);
         let mut child = command.spawn().map_err(failed)?;
         self.signals.started(child.id());
         // a facet that does not read must not stop the run
         child.stdin.iter().try_for_each(|pipe| ioctl_fionbio(pipe, true)).map_err(|e| failed(e.into()))?;
-        let reports = child.stdout.take().map(ReportReader::start).transpose();
-        process.written_before = process.written();
+        let count = process.members.len();
+        let reports = child.stdout.take().map(|pipe| ReportReader::start(pipe, count)).transpose();
+        let written: Vec<u64> = (0..count).map(|k| process.written(k)).collect();
+        process.members.iter_mut().zip(written).for_each(|(member, written)| member.written_before = written);
         (process.child, process.began, process.ended, process.fault) = (Some(child), Some(Instant::now()), None, None);
-        process.reports = reports.map_err(|e| Failure::run(&format!("starting facet {}", process.name), e))?;
+        process.reports = reports.map_err(failed)?;
         self.pattern.iter().for_each(|name| process.tell_pattern(name));
         Ok(())
     }
@@ -376,18 +398,24 @@ impl Drop for FacetProcesses {
 }
 
 impl FacetProcess {
-    /// Creates a facet without a process. `command` returns the command of the first start, or of
-    /// further ones.
-    fn new(slot: usize, name: &str, command: impl Fn(bool) -> Vec<OsString>) -> FacetProcess {
-        FacetProcess {
+    /// Creates the process of facets, given by slot and name, before its start. `command` returns the
+    /// command of the first start, or of further ones.
+    fn new<'a>(
+        members: impl Iterator<Item = (usize, &'a str)>,
+        command: impl Fn(bool) -> Vec<OsString>,
+    ) -> FacetProcess {
+        let member = |(slot, name): (usize, &str)| Member {
             slot: slot as FacetNumber,
             name: name.to_owned(),
+            written_before: 0,
+        };
+        FacetProcess {
+            members: members.map(member).collect(),
             command: command(false),
             command_again: command(true),
             child: None,
             began: None,
             reports: None,
-            written_before: 0,
             ended: None,
             over: false,
             failed: false,
@@ -404,25 +432,42 @@ impl FacetProcess {
         pipe.into_iter().for_each(|pipe| _ = pipe.write_all(format!("{PATTERN_MARK}{name}\n").as_bytes()));
     }
 
-    fn received(&self) -> Received {
-        self.reports.as_ref().map_or_else(Received::default, ReportReader::received)
+    fn title(&self) -> String {
+        title(&self.members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>())
     }
 
-    /// Returns the number of frames written by all processes of this facet.
-    fn written(&self) -> u64 {
-        self.written_before + self.received().report.written
+    fn names(&self) -> String {
+        self.members.iter().map(|member| member.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
+    fn received_of(&self, member: usize) -> Received {
+        self.reports.as_ref().map_or_else(Received::default, |reports| reports.received(member))
+    }
+
+    fn received(&self) -> impl Iterator<Item = Received> {
+        (0..self.members.len()).map(|k| self.received_of(k))
+    }
+
+    /// Returns the number of frames of a facet that its processes have written.
+    fn written(&self, member: usize) -> u64 {
+        self.members[member].written_before + self.received_of(member).report.written
+    }
+
+    /// Returns whether a facet prepares to join.
     fn is_preparing(&self) -> bool {
-        let Received { report, heard, .. } = self.received();
-        let recent = heard.or(self.began).is_some_and(|at| at.elapsed() < REPORT_TIMEOUT);
-        self.child.is_some() && recent && (heard.is_none() || report.preparing)
+        let prepares = |Received { report, heard, .. }: Received| {
+            let recent = heard.or(self.began).is_some_and(|at| at.elapsed() < REPORT_TIMEOUT);
+            recent && (heard.is_none() || report.preparing)
+        };
+        self.child.is_some() && self.received().any(prepares)
     }
 
     /// Returns whether the process still writes frames and makes progress.
     fn is_writing(&self) -> bool {
-        let Received { report, proceeded, .. } = self.received();
-        self.child.is_some() && report.waiting > 0 && proceeded.is_some_and(|at| at.elapsed() < WRITE_TIMEOUT)
+        let writes = |Received { report, proceeded, .. }: Received| {
+            report.waiting > 0 && proceeded.is_some_and(|at| at.elapsed() < WRITE_TIMEOUT)
+        };
+        self.child.is_some() && self.received().any(writes)
     }
 
     /// Returns why the run fails by this facet, if it does.
@@ -443,6 +488,11 @@ impl FacetProcess {
         self.fault = status.code().filter(|code| OWN_FAILURES.contains(code)).map(|_| describe_exit(status));
         Some(status)
     }
+}
+
+/// Returns how the facets of a process are called.
+fn title(names: &[&str]) -> String {
+    format!("{} {}", if names.len() > 1 { "facets" } else { "facet" }, names.join(", "))
 }
 
 fn describe_exit(status: ExitStatus) -> String {
