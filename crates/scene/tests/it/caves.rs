@@ -228,6 +228,27 @@ fn a_facet_has_a_card_and_a_monitor() {
 }
 
 #[test]
+fn facets_of_a_process_share_node_and_adapter() {
+    let second = "[[facet]]\nname = \"g\"\nscreen = \"s\"\nsize_px = [800, 600]\nprocess = \"walls\"";
+    let with = |keys: &str| {
+        let first = SMALL.replace("[800, 600]", "[800, 600]\nprocess = \"walls\"\ngpu = \"RTX\"");
+        Cave::parse(&format!("{first}\n{second}\n{keys}\n"), "my.toml")
+    };
+    let cave = with("gpu = \"RTX\"").unwrap();
+    assert!(cave.facets.iter().all(|facet| facet.process.as_deref() == Some("walls")));
+    assert_eq!(Cave::parse(SMALL, "my.toml").unwrap().facets[0].process, None);
+    let other_card = with("").unwrap_err().to_string();
+    let place = "facet \"g\" is in the process \"walls\" of facet \"f\", which has another `gpu`";
+    assert!(other_card.contains(place), "{other_card}");
+    let node = "gpu = \"RTX\"\nnode = \"n\"\n[[node]]\nname = \"n\"\naddress = \"127.0.0.1\"";
+    let other_node = with(node).unwrap_err().to_string();
+    assert!(other_node.contains("which has another `node`"), "{other_node}");
+    let wrong = SMALL.replace("[800, 600]", "[800, 600]\nprocess = \"a/b\"");
+    let wrong = Cave::parse(&wrong, "my.toml").unwrap_err().to_string();
+    assert!(wrong.contains("1 to 64 letters"), "{wrong}");
+}
+
+#[test]
 fn eyes_have_their_order_in_each_stereo_mode() {
     let facet = |keys: &str| {
         let text = SMALL.replace("[800, 600]", &format!("[800, 600]\n{keys}"));

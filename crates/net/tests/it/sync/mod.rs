@@ -3,6 +3,7 @@
 mod compute;
 mod events;
 mod faults;
+mod following;
 mod hostile;
 mod links;
 mod lockstep;
