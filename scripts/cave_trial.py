@@ -179,12 +179,12 @@ def frames(options):
     return whole and same and faults == 0
 
 
-def cube_cave(facets, size):
-    """A cube with the first screens of cube6, one mono facet each, on this machine."""
+def cube_cave(facets, size, stereo="mono"):
+    """A cube with the first screens of cube6, a facet each, on this machine."""
     screens = re.findall(r"\[\[screen\]\][^\[]*(?:\[[^\[]*){3}", (ROOT / "caves/cube6.toml").read_text())[:facets]
     names = [re.search(r'name = "(\w+)"', screen)[1] for screen in screens]
-    parts = [f'{screen}\n[[facet]]\nname = "{name}"\nscreen = "{name}"\nsize_px = [{size[0]}, {size[1]}]\n' for screen, name in zip(screens, names)]
-    path = OUT / f"cube_{facets}_{size[0]}.toml"
+    parts = [f'{screen}\n[[facet]]\nname = "{name}"\nscreen = "{name}"\nsize_px = [{size[0]}, {size[1]}]\nstereo = "{stereo}"\n' for screen, name in zip(screens, names)]
+    path = OUT / f"cube_{facets}_{size[0]}_{stereo}.toml"
     sync = "[sync]\nready_timeout_ms = 20000\ndrop_timeout_ms = 20000\nconnect_timeout_ms = 60000\n"
     path.write_text('[[user]]\nname = "viewer"\neye_m = [0, 0, 1.6]\n' + "".join(parts) + sync)
     return path
@@ -208,6 +208,28 @@ def rates(options):
                 line.append(f"{(summary['frames'] - 1) / summary['wall_s']:.1f} ({load:.1f})")
             print(f"| {facets} | {size[0]} x {size[1]} | {' | '.join(line)} |", flush=True)
     print(f"rates: {options.rates} frames of each run {'on all facets' if whole else 'NOT ON ALL FACETS'}, drawn by {', '.join(sorted(drivers))}")
+    return whole
+
+
+def processes(options):
+    """Frames per second and processor time of a frame with a process per facet and with one process for all, alternately. Prints the table of docs/running_a_cave.md."""
+    print("processes: billiards, with a process per facet and with --one-process; in brackets the load before the run")
+    print("| facets | size | a process each: frames/s | processor ms | one process: frames/s | processor ms |\n|---|---|---|---|---|---|", flush=True)
+    whole, drivers = True, set()
+    for facets, size, stereo in [(4, (1024, 768), "mono"), (6, (1024, 768), "mono"), (6, (1920, 1080), "side_by_side")]:
+        line = []
+        for more in [[], ["--one-process"]]:
+            load, file, before = os.getloadavg()[0], OUT / "processes.json", os.times()
+            tumble("cave", "billiards", "--cave", cube_cave(facets, size, stereo), "--duration", options.rates / 120, "--fps", 120, "--no-realtime", "--offscreen",
+                   "--quality", options.quality, "--quiet", "--summary", file, *more)
+            after, summary = os.times(), json.loads(file.read_text())
+            whole &= all(facet["presented"] == summary["frames"] for facet in summary["facets"])
+            drivers.update(facet["adapter"] for facet in summary["facets"])
+            spent = after.children_user + after.children_system - before.children_user - before.children_system
+            line += [f"{(summary['frames'] - 1) / summary['wall_s']:.1f} ({load:.1f})", f"{1e3 * spent / summary['frames']:.0f}"]
+        print(f"| {facets} | {size[0]} x {size[1]}{'' if stereo == 'mono' else ' in stereo'} | {' | '.join(line)} |", flush=True)
+    print(f"processes: `{options.quality}`; processor time is that of all processes and threads, with the start; {'all frames on all facets' if whole else 'FRAMES ARE MISSING'}, "
+          f"drawn by {', '.join(sorted(drivers))}")
     return whole
 
 
@@ -615,7 +637,7 @@ def viewers(options):
     return code == 0 and counts.get("/scene", 0) >= 1 and counts.get("/tf", 0) > 30
 
 
-TRIALS = [frames, rates, bowling, kills, drawn_kills, freezes, launchers, servers, soak, everywhere, minute, cuts, namespace, viewers]
+TRIALS = [frames, rates, processes, bowling, kills, drawn_kills, freezes, launchers, servers, soak, everywhere, minute, cuts, namespace, viewers]
 SHORT = [frames, kills, freezes, launchers, servers, everywhere, minute, cuts]
 
 
@@ -623,7 +645,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--long", action="store_true", help="the full numbers, and all trials")
     parser.add_argument("--frames", type=int, help="frames of `frames` and `namespace` (30; long 600)")
-    parser.add_argument("--rates", type=int, help="frames of each run of `rates` (20; long 60)")
+    parser.add_argument("--rates", type=int, help="frames of each run of `rates` and `processes` (20; long 60)")
     parser.add_argument("--kills", type=int, help="kills and freezes of each kind (2; long 20)")
     parser.add_argument("--soak", type=int, help="frames of `soak` (6,000; long 108,000)")
     parser.add_argument("--everywhere", type=int, help="frames of `everywhere` (300; long 108,000)")

@@ -3,6 +3,8 @@
 //!
 //! A process has at most one window, because the window library allows one event loop.
 
+mod monitor;
+
 use crate::RenderError;
 use crate::gpu::Screen;
 use std::sync::Arc;
@@ -13,9 +15,6 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
-
-/// Difference of a monitor's refresh rate from the wanted one that is accepted, Hz: 59.94 is 60.
-const RATE_TOLERANCE_HZ: f64 = 0.5;
 
 /// Options of a new window.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,9 +31,11 @@ pub struct WindowOptions {
     pub resizable: bool,
     /// Name of the monitor from whose upper left corner the position counts; `None` for the desktop.
     pub monitor: Option<String>,
-    /// Whether it covers the monitor, which must have the size of its content.
+    /// Whether it covers the monitor, which must have the size of its content, or with `refresh_hz` a video
+    /// mode of this size.
     pub full_screen: bool,
-    /// Refresh rate that the monitor must have within 0.5 Hz, Hz.
+    /// Refresh rate of the monitor within 0.5 Hz, Hz. A full screen sets it, with its size, by the video mode;
+    /// for other windows the monitor must have it.
     pub refresh_hz: Option<f64>,
     /// Text that the name of the graphics adapter must contain, in any case.
     pub adapter: Option<String>,
@@ -133,42 +134,6 @@ fn tried(reason: String) -> String {
     if tried.is_empty() { reason } else { format!("{}: {reason}", tried.join(", ")) }
 }
 
-/// Returns the monitor that the options name, or for a full screen the primary one, and checks it. `None` if
-/// they need none.
-fn monitor(event_loop: &ActiveEventLoop, options: &WindowOptions) -> Result<Option<MonitorHandle>, RenderError> {
-    let name = |monitor: &MonitorHandle| monitor.name().unwrap_or_else(|| "without a name".into());
-    let found = match &options.monitor {
-        Some(wanted) => {
-            let named = event_loop.available_monitors().find(|monitor| name(monitor) == *wanted);
-            Some(named.ok_or_else(|| {
-                let present: Vec<String> = event_loop.available_monitors().map(|monitor| name(&monitor)).collect();
-                RenderError::Monitor(format!("there is no monitor \"{wanted}\"; there are: {}", present.join(", ")))
-            })?)
-        }
-        None if options.full_screen || options.refresh_hz.is_some() => {
-            let first = event_loop.primary_monitor().or_else(|| event_loop.available_monitors().next());
-            Some(first.ok_or_else(|| RenderError::Monitor("the desktop has no monitor".into()))?)
-        }
-        None => None,
-    };
-    let Some(monitor) = found else { return Ok(None) };
-    let (PhysicalSize { width, height }, [w, h]) = (monitor.size(), options.size_px);
-    if options.full_screen && [width, height] != [w, h] {
-        return Err(RenderError::Monitor(format!(
-            "monitor \"{}\" has {width} x {height} pixels and the full-screen picture {w} x {h}; expected the same",
-            name(&monitor)
-        )));
-    }
-    if let Some(wanted) = options.refresh_hz {
-        let rate = monitor.refresh_rate_millihertz().map(|millihertz| f64::from(millihertz) / 1000.0);
-        if rate.is_none_or(|rate| (rate - wanted).abs() > RATE_TOLERANCE_HZ) {
-            let has = rate.map_or("reports no refresh rate".into(), |rate| format!("has {rate:.2} Hz"));
-            return Err(RenderError::Monitor(format!("monitor \"{}\" {has}, expected {wanted} Hz", name(&monitor))));
-        }
-    }
-    Ok(Some(monitor))
-}
-
 struct Host<'a, A: WindowApp> {
     options: &'a WindowOptions,
     app: &'a mut A,
@@ -196,7 +161,7 @@ impl<A: WindowApp> Host<'_, A> {
             .with_inner_size(PhysicalSize::new(width, height))
             .with_decorations(self.options.decorated)
             .with_resizable(self.options.resizable);
-        let monitor = monitor(event_loop, self.options)?;
+        let monitor = monitor::find(event_loop, self.options)?;
         let corner = monitor.as_ref().map_or(PhysicalPosition::default(), MonitorHandle::position);
         let position = if self.options.full_screen { Some([0, 0]) } else { self.options.position_px };
         if let Some([x, y]) = position {
@@ -204,7 +169,11 @@ impl<A: WindowApp> Host<'_, A> {
         }
         if self.options.full_screen {
             // a desktop without a window manager takes position and size alone
-            wanted = wanted.with_decorations(false).with_fullscreen(Some(Fullscreen::Borderless(monitor)));
+            let covered = match monitor::video_mode(monitor.as_ref(), self.options)? {
+                Some(mode) => Fullscreen::Exclusive(mode),
+                None => Fullscreen::Borderless(monitor),
+            };
+            wanted = wanted.with_decorations(false).with_fullscreen(Some(covered));
         }
         let window = event_loop.create_window(wanted).map_err(|e| RenderError::NoWindow { reason: e.to_string() })?;
         let adapter = self.options.adapter.as_deref();
@@ -265,6 +234,8 @@ impl<A: WindowApp> ApplicationHandler for Host<'_, A> {
     }
 
     fn exiting(&mut self, _event_loop: &ActiveEventLoop) {
+        // the desktop's video mode returns
+        self.screen.iter().for_each(Screen::leave_full_screen);
         // before the event loop, whose display it uses
         self.screen = None;
     }

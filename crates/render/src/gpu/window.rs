@@ -149,6 +149,13 @@ impl Screen {
         &mut self.renderer
     }
 
+    /// Ends a full screen, so that the video mode that it has set is replaced by the desktop's own.
+    pub(crate) fn leave_full_screen(&self) {
+        if matches!(self.window.fullscreen(), Some(winit::window::Fullscreen::Exclusive(_))) {
+            self.window.set_fullscreen(None);
+        }
+    }
+
     /// Width and height, pixels; for an empty window the last ones.
     pub fn size_px(&self) -> [u32; 2] {
         [self.config.width, self.config.height]
