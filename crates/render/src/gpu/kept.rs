@@ -15,7 +15,7 @@
 //! | `//TAKE` at the beginning of a fragment stage | `kept_view` and `kept_scene` are filled from `in` |
 //! | `//TAKE view` | the same from the uniform `view`, for depth alone |
 //!
-//! Functions of fragment stages then read these in place of `view` and `scene`.
+//! Functions of fragment stages then read these instead of `view` and `scene`.
 
 /// Number of lights in `kept_scene`; further ones are read from the uniform.
 pub(super) const KEPT_LIGHTS: usize = 3;
@@ -131,7 +131,7 @@ pub(super) fn with_flat_inputs(parts: &[Part]) -> String {
     out
 }
 
-/// Returns a line that reads the kept numbers in place of the uniforms.
+/// Returns a line that reads the kept numbers instead of the uniforms.
 fn with_kept_names(line: &str, part: Part) -> String {
     let mut line = line.to_owned();
     if let Part::Fragment(_) = part {
@@ -141,4 +141,30 @@ fn with_kept_names(line: &str, part: Part) -> String {
         line = line.replace(&format!("scene.{name}"), &format!("kept_scene.{name}"));
     }
     (0..KEPT_LIGHTS).fold(line, |line, k| line.replace(&format!("scene.lights[{k}]"), &format!("kept_scene.light_{k}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mark_is_replaced_and_all_inputs_have_values() {
+        let parts = [
+            Part::Vertex(
+                "struct Out {\n    //KEPT 2\n};\n    return Out(x /*KEPT*/);\n    //KEPT out\n    let w = view.size.x;",
+            ),
+            Part::Fragment(
+                "    //TAKE\n    let a = view.size.z + scene.tone.x + scene.lights[2].at.x + scene.lights[i].at.x;",
+            ),
+            Part::Fragment("    //TAKE view"),
+        ];
+        let text = with_flat_inputs(&parts);
+        assert!(!text.contains("KEPT") && !text.contains("TAKE"), "{text}");
+        assert!(text.contains("kept_view.size.z + kept_scene.tone.x + kept_scene.light_2.at.x + scene.lights[i].at.x"));
+        assert!(
+            text.contains("let w = view.size.x;") && text.contains("@location(22) @interpolate(flat) kept_20: vec4f")
+        );
+        let depth_only = text.rsplit_once("take(").unwrap().1;
+        assert!(depth_only.contains("view.depth") && !depth_only.contains("scene"), "{depth_only}");
+    }
 }

@@ -35,7 +35,7 @@ impl AppliedFrame {
     }
 }
 
-/// What a follower knows of its frames.
+/// Frames of a follower.
 pub(super) struct Followed {
     content: Content,
     /// Without objects.
@@ -90,7 +90,7 @@ impl FacetSession {
         Some(AppliedFrame { run: self.run, frame, time_s: self.time_s(), hash, viewer })
     }
 
-    /// Begins the frame that waits if the leader has applied it last, in place of [`begin`](Self::begin).
+    /// Begins the frame that waits if the leader has applied it last, instead of [`begin`](Self::begin).
     /// Returns whether it has; otherwise the frame goes on waiting.
     pub fn follow(&mut self, leader: &AppliedFrame) -> bool {
         let Shown::Followed(followed) = &mut self.content else { return false };

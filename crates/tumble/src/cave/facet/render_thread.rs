@@ -28,7 +28,7 @@ struct RenderRequest {
     pattern: Option<CalibrationPattern>,
 }
 
-/// What is drawn, and who gets it.
+/// Facet to draw, and the place of its pictures.
 struct Canvas {
     /// `None` for all facets unfolded.
     facet: Option<Facet>,
@@ -41,9 +41,9 @@ pub struct RenderThread {
     quality: Option<Quality>,
     overlays: DebugDraw,
     requests: SyncSender<RenderRequest>,
-    /// Of the first facet.
+    /// Pictures of the first facet.
     pictures: Pictures,
-    /// Of the other facets.
+    /// Pictures of the other facets.
     others: Vec<Pictures>,
     software: bool,
     adapter: String,
