@@ -202,9 +202,8 @@ fn runner(
     control: FacetControl,
 ) -> Result<FacetRunner, Failure> {
     let log = frame_log(options, &control.name, &control.reporter)?;
-    let reporter = control.reporter.clone();
-    let watch = options.draw.watch_pictures.then(|| PictureWatch::new(reporter.clone()));
-    Ok(FacetRunner::new(session, membership, painter, log, options.draw.burn_in, control, reporter, watch))
+    let watch = options.draw.watch_pictures.then(|| PictureWatch::new(control.reporter.clone()));
+    Ok(FacetRunner::new(session, membership, painter, log, options.draw.burn_in, control, watch))
 }
 
 /// Runs several facets, each in a thread. If one fails, all end.

@@ -124,28 +124,33 @@ mod tests {
         Ok(Picture::Image(Image { width: 1, height: 1, rgba: vec![level; 4] }))
     }
 
+    fn taken(pictures: &Pictures) -> Result<Option<Vec<u8>>, String> {
+        let taken = pictures.take(SHORT).map_err(|failure| failure.report().to_owned())?;
+        Ok(taken.map(|image| image.rgba))
+    }
+
     #[test]
     fn a_session_gets_the_frame_that_it_wants_and_no_other() {
         let pictures = Pictures::default();
         pictures.put(6, false, picture(6));
         pictures.put(7, false, picture(7)); // nobody wanted 6
-        assert!(pictures.take(SHORT).unwrap().is_none(), "nothing is wanted");
+        assert!(taken(&pictures).unwrap().is_none(), "nothing is wanted");
         pictures.want(7);
-        assert_eq!(pictures.take(SHORT).unwrap().unwrap().rgba, [7; 4]);
+        assert_eq!(taken(&pictures).unwrap().unwrap(), [7; 4]);
         pictures.want(8);
-        assert!(pictures.take(SHORT).unwrap().is_none());
+        assert!(taken(&pictures).unwrap().is_none());
         // the painter waits until a wanted picture is taken
         pictures.put(8, false, picture(8));
         let theirs = pictures.clone();
         let painter = std::thread::spawn(move || theirs.put(9, false, picture(9)));
         std::thread::sleep(20 * SHORT);
         assert!(!painter.is_finished());
-        assert_eq!(pictures.take(SHORT).unwrap().unwrap().rgba, [8; 4]);
+        assert_eq!(taken(&pictures).unwrap().unwrap(), [8; 4]);
         painter.join().unwrap();
         pictures.want(8);
-        assert!(pictures.take(SHORT).unwrap_err().report().contains("frame 8 was replaced by that of frame 9"));
+        assert!(taken(&pictures).unwrap_err().contains("frame 8 was replaced by that of frame 9"));
         pictures.want(10);
         pictures.end();
-        assert!(pictures.take(SHORT).unwrap_err().report().contains("has ended"));
+        assert!(taken(&pictures).unwrap_err().contains("has ended"));
     }
 }

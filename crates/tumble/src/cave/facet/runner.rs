@@ -56,10 +56,9 @@ impl FacetRunner {
         log: Option<FrameLog>,
         burn_in: bool,
         control: FacetControl,
-        reporter: Reporter,
         watch: Option<PictureWatch>,
     ) -> FacetRunner {
-        let server_wait = ServerWait::default();
+        let (reporter, server_wait) = (control.reporter.clone(), ServerWait::default());
         FacetRunner {
             facet,
             membership,
