@@ -13,14 +13,14 @@
 
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::algorithms::free_motion::FreeMotion;
-use crate::articulated::model::Model;
 use crate::articulated::model::dof::{Coupling, DofSettings};
-use crate::object::Material;
+use crate::articulated::model::{Model, ModelError};
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::part_state::Wrench;
 use crate::object::visual::Visual;
-use crate::{Anchor, ObjectId};
+use crate::object::{Material, ShapeMaterials};
+use crate::{Anchor, BodyError, ObjectId};
 use nalgebra::{Quaternion, Translation3};
 use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
@@ -64,6 +64,24 @@ pub enum ArticulatedError {
         /// Number of degrees of freedom.
         count: usize,
     },
+    /// A shape of a link is not valid.
+    #[error("articulated body '{body}', link '{link}': {why}")]
+    Collider {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+        /// Reason.
+        why: BodyError,
+    },
+    /// The tree of links is not valid with a constant.
+    #[error("articulated body '{body}': {why}")]
+    Model {
+        /// Body.
+        body: String,
+        /// Reason.
+        why: ModelError,
+    },
     /// Numbers are not valid positions or velocities.
     #[error("articulated body '{body}': {what} must be {expected} finite numbers, quaternions of unit length")]
     Start {
@@ -93,6 +111,13 @@ pub struct Collider {
     pub group: CollisionGroup,
     /// Groups that the part collides with, one bit each.
     pub mask: u64,
+    /// Name of a shape that is no compound; parts of a compound have [their own](tumble_collide::CompoundPart::name).
+    pub name: Option<String>,
+    /// Surface constants of those parts of a compound that have their own.
+    pub shape_materials: ShapeMaterials,
+    /// Direction, of any length above 0, in the frame of the shape, of a collider that collides on one side only, as a
+    /// [one-sided body](crate::RigidBody::with_one_way) does; `None` for all others.
+    pub one_way: Option<Vec3>,
 }
 
 impl Collider {
@@ -105,7 +130,39 @@ impl Collider {
             contact_mode: ContactMode::default(),
             group: CollisionGroup::default(),
             mask: u64::MAX,
+            name: None,
+            shape_materials: ShapeMaterials::default(),
+            one_way: None,
         }
+    }
+
+    /// Sets the name, by which contacts, hits and events report the shape.
+    #[must_use]
+    pub fn with_name(mut self, name: impl Into<String>) -> Self {
+        self.name = Some(name.into());
+        self
+    }
+
+    /// Sets the constants of its surface.
+    #[must_use]
+    pub fn with_material(mut self, material: Material) -> Self {
+        self.material = material;
+        self
+    }
+
+    /// Sets the constants of the surface of one part of its compound.
+    #[must_use]
+    pub fn with_shape_material(mut self, shape: usize, material: Material) -> Self {
+        self.shape_materials.set(shape, Some(material));
+        self
+    }
+
+    /// Makes it collide on one side only: with what comes against `direction` (any length above 0, the frame of the
+    /// shape).
+    #[must_use]
+    pub fn with_one_way(mut self, direction: Vec3) -> Self {
+        self.one_way = Some(direction);
+        self
     }
 }
 
@@ -257,11 +314,20 @@ impl ArticulatedBody {
     }
 
     /// Adds a shape to the link of that name, which may be a fixed link that is folded into its
-    /// parent.
+    /// parent. Then its names become `LINK/NAME`, and the shape is one of the parent, or of the first link on the base.
     ///
     /// # Errors
-    /// [`ArticulatedError::NoLink`].
+    /// [`ArticulatedError::NoLink`]; [`ArticulatedError::Collider`] for a name that another shape of the link has, surface
+    /// constants of a part that the shape does not have, and a one-way direction without a length.
     pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
+        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        let carrier = frame.link;
+        self.name_within(link, carrier, &mut collider);
+        self.check_collider(carrier, &collider).map_err(|why| ArticulatedError::Collider {
+            body: self.name.clone(),
+            link: link.into(),
+            why,
+        })?;
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         let center = Translation3::from(collider.shape.center_of_mass());
         collider.pose = frame.pose * (collider.pose * center);
@@ -355,6 +421,19 @@ impl ArticulatedBody {
         Ok(())
     }
 
+    /// Sets the [`armature`](super::Link::armature) of the joint that moves a link, kg·m² or kg. In a world
+    /// [`World::set_armature`](crate::World::set_armature) does it.
+    ///
+    /// # Errors
+    /// [`ArticulatedError`]: there is no such moving link, its joint has no armature, or the value is out of its range.
+    pub fn with_armature(mut self, link: &str, armature: f64) -> Result<Self, ArticulatedError> {
+        let Some(number) = self.model.link(link) else { return Err(self.no_link(link)) };
+        match self.model.set_armature(number, armature) {
+            Ok(()) => Ok(self),
+            Err(why) => Err(ArticulatedError::Model { body: self.name, why }),
+        }
+    }
+
     /// Couples one degree of freedom to another.
     ///
     /// # Errors
@@ -415,6 +494,10 @@ impl ArticulatedBody {
     /// Returns the collider of a part, if it has one.
     pub(super) fn collider(&self, part: usize) -> Option<&LinkCollider> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
+    }
+
+    pub(super) fn collider_mut(&mut self, part: usize) -> Option<&mut LinkCollider> {
+        self.colliders.get_mut(part.checked_sub(self.model.links().len() + 1)?)
     }
 
     /// Returns the parent of a link, skipping massless links of stacked joints. `None` is the base.

@@ -8,7 +8,7 @@ use crate::RigidBody;
 use crate::object::visual::Visual;
 use crate::object::{Appearance, Material};
 use nalgebra::Translation3;
-use tumble_collide::{Pose, Shape, ShapeError};
+use tumble_collide::{Pose, Shape, ShapeError, Vec3};
 
 /// Why an articulated body cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -82,6 +82,17 @@ enum Mass {
     Given(LinkMass),
 }
 
+/// The purpose of a shape of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Use {
+    /// It is only drawn and has mass.
+    Drawn,
+    /// It collides with the surface of its link.
+    Collides,
+    /// It collides with a surface of its own.
+    HasSurface,
+}
+
 /// A link of an [`ArticulationBuilder`]: its joint, its shapes and its mass.
 ///
 /// A link with shapes has by default the density of water; a link without shapes has no mass.
@@ -92,7 +103,7 @@ pub struct LinkBuilder {
     parent: Option<String>,
     joint: Joint,
     pose: Pose,
-    shapes: Vec<(Collider, bool)>,
+    shapes: Vec<(Collider, Use)>,
     mass: Mass,
     dof: DofSettings,
     armature: f64,
@@ -138,13 +149,36 @@ impl LinkBuilder {
 
     /// Adds a shape that collides and is drawn, at a pose in the frame of the link.
     pub fn with_shape(mut self, shape: Shape, pose: Pose) -> Self {
-        self.shapes.push((Collider::new(shape, pose), true));
+        self.shapes.push((Collider::new(shape, pose), Use::Collides));
+        self
+    }
+
+    /// Adds a shape that collides and is drawn, with surface constants, groups and a name of its own.
+    pub fn with_collider(mut self, collider: Collider) -> Self {
+        self.shapes.push((collider, Use::HasSurface));
+        self
+    }
+
+    /// Sets the name of the shape that was added last.
+    pub fn with_shape_name(mut self, name: impl Into<String>) -> Self {
+        if let Some((collider, _)) = self.shapes.last_mut() {
+            collider.name = Some(name.into());
+        }
         self
     }
 
     /// Adds a shape that is drawn and has mass, and does not collide.
     pub fn with_visual_shape(mut self, shape: Shape, pose: Pose) -> Self {
-        self.shapes.push((Collider::new(shape, pose), false));
+        self.shapes.push((Collider::new(shape, pose), Use::Drawn));
+        self
+    }
+
+    /// Makes the shape that was added last collide on one side only: with what comes against `direction` (any length above
+    /// 0, the frame of the shape).
+    pub fn with_one_way(mut self, direction: Vec3) -> Self {
+        if let Some((collider, _)) = self.shapes.last_mut() {
+            collider.one_way = Some(direction);
+        }
         self
     }
 
@@ -462,13 +496,16 @@ impl ArticulationBuilder {
 }
 
 fn add_shapes(body: &mut ArticulatedBody, link: &LinkBuilder) -> Result<(), ArticulatedError> {
-    for (collider, collides) in &link.shapes {
+    for (collider, kind) in &link.shapes {
         let center = Translation3::from(collider.shape.center_of_mass());
         let visual = Visual::shape(0, collider.pose * center, collider.shape.clone(), link.appearance.clone());
         body.add_visual(&link.name, visual)?;
-        if *collides {
-            body.add_collider(&link.name, Collider { material: link.material, ..collider.clone() })?;
-        }
+        let collider = match kind {
+            Use::Drawn => continue,
+            Use::Collides => collider.clone().with_material(link.material),
+            Use::HasSurface => collider.clone(),
+        };
+        body.add_collider(&link.name, collider)?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ mod joint_rows;
 mod model;
 mod object;
 mod parts;
+mod shapes;
 mod simd;
 mod swing;
 mod turning;

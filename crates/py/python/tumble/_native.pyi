@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import disjoint_base
+from typing_extensions import Self, disjoint_base
 
 from tumble._extension import Behavior, Force, Intersect
 from tumble._values import Energy, Event, Firing, LinkSpheres, Momentum, SphereLevel
@@ -100,6 +100,9 @@ class Shape:
         """Radius of the smallest sphere about the shape's origin that contains it, meters; infinite
         for a half-space.
         """
+    @property
+    def name(self) -> str | None: ...
+    def named(self, name: str) -> Self: ...
 
 @final
 class Sphere(Shape):
@@ -408,14 +411,17 @@ class RigidBody:
         """Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts."""
     @adhesion.setter
     def adhesion(self, value: float) -> None: ...
-    def shape_material(self, shape: int) -> dict[str, Any]:
+    @property
+    def shape_names(self) -> list[str | None]: ...
+    def shape_number(self, name: str) -> int: ...
+    def shape_material(self, shape: int | str) -> dict[str, Any]:
         """Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
 
         shape: index of the part of a ``Compound``, as ``shapes`` of contacts has it.
         """
     def set_shape_material(
         self,
-        shape: int,
+        shape: int | str,
         *,
         friction: float | None = None,
         restitution: float | None = None,
@@ -1202,6 +1208,7 @@ class ArticulationBuilder:
         orientation: ArrayLike | None = None,
         *,
         collides: bool = True,
+        one_way: ArrayLike | None = None,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
         collides, or is only drawn; both count for the mass.
@@ -1345,6 +1352,30 @@ class Articulation:
         """Dry friction of each degree of freedom, shape (dof,), N·m or N. Settable like ``joint_damping``."""
     @joint_friction.setter
     def joint_friction(self, value: ArrayLike) -> None: ...
+    @property
+    def armature(self) -> _Floats: ...
+    @armature.setter
+    def armature(self, value: ArrayLike) -> None: ...
+    @property
+    def shape_names(self) -> list[list[str | None]]: ...
+    def shape_number(self, link: str, name: str) -> int: ...
+    def shape_material(self, link: str, shape: int | str) -> dict[str, Any]: ...
+    def set_shape_material(
+        self,
+        link: str,
+        shape: int | str,
+        *,
+        friction: float | None = None,
+        restitution: float | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
+    ) -> None: ...
     @property
     def stiffness(self) -> _Floats:
         """Stiffness of the spring of each degree of freedom, shape (dof,), N·m/rad or N/m; 0 without one. Settable like
@@ -2238,6 +2269,7 @@ class World:
         """
     @max_turn.setter
     def max_turn(self, value: float) -> None: ...
+    def shape_name(self, body: int | _Body, part: int, shape: int) -> str | None: ...
     def cast_rays(
         self,
         origins: ArrayLike,

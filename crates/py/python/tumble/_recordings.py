@@ -32,6 +32,8 @@ class RecordedEvent(NamedTuple):
     """Impulse on ``a`` over the step, N·s."""
     point: tuple[float, float, float]
     """Point with the largest impulse, m."""
+    shapes: tuple[int, int]
+    """Numbers of the shapes at the point: indices of the parts of compounds, 0 for all other shapes."""
 
 
 @dataclass(frozen=True, repr=False)
