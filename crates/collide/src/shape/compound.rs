@@ -258,6 +258,31 @@ impl CompoundShape {
     }
 }
 
+/// Numbers and names of the shapes of which a shape consists.
+impl Shape {
+    /// Returns how many shapes it consists of: the parts of a compound, 1 for all others.
+    pub fn part_count(&self) -> usize {
+        if let Shape::Compound(compound) = self { compound.parts().len() } else { 1 }
+    }
+
+    /// Returns the name of a compound's part; `None` for a part without one and for all other shapes.
+    pub fn part_name(&self, part: usize) -> Option<&str> {
+        let Shape::Compound(compound) = self else { return None };
+        compound.parts().get(part)?.name.as_deref()
+    }
+
+    /// Returns a shape with `link/` before the names of a compound's parts; the same one if they have none.
+    #[must_use]
+    pub fn with_names_in(&self, link: &str) -> Shape {
+        match self {
+            Shape::Compound(compound) if compound.parts().iter().any(|part| part.name.is_some()) => {
+                Shape::Compound(Arc::new(compound.with_names_in(link)))
+            }
+            other => other.clone(),
+        }
+    }
+}
+
 /// Returns the surface of a shape as triangles; a half-space and a compound have none.
 fn surface(shape: &Shape) -> TriMesh {
     match shape {

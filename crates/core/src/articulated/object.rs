@@ -1,7 +1,8 @@
 //! The traits of objects for the articulated body: dynamics, collisions, visuals and
 //! synchronization.
 
-use super::body::{ArticulatedBody, BodyCache, LinkCollider};
+use super::body::{ArticulatedBody, BodyCache};
+use super::collider::LinkCollider;
 use super::shapes::name_of;
 use crate::articulated::algorithms::dynamics::Dynamics;
 use crate::articulated::algorithms::energy::{energy, momentum};

@@ -4,7 +4,8 @@
 //! one by one. Shapes of fixed links belong to the link into which these are folded, and those on the base to the first
 //! link there; their names then begin with the name of their own link, as in `tool/pad`.
 
-use super::body::{ArticulatedBody, ArticulatedError, Collider};
+use super::body::{ArticulatedBody, ArticulatedError};
+use super::collider::Collider;
 use crate::BodyError;
 use crate::object::Material;
 use crate::rigid::check_shape_name;
