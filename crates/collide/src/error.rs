@@ -58,6 +58,32 @@ pub enum ShapeError {
         /// Number of the part, from 1.
         number: usize,
     },
+    /// Two parts of a compound with one name.
+    #[error(
+        "parts {first} and {second} of a compound are both named '{name}'; give the shapes of one body different names"
+    )]
+    PartNames {
+        /// Number of the first one, from 1.
+        first: usize,
+        /// Number of the second one.
+        second: usize,
+        /// The name.
+        name: String,
+    },
+    /// A part of a compound with an empty name.
+    #[error("the name of part {number} of a compound is empty; it must have a letter, or be left out")]
+    EmptyName {
+        /// Its number, from 1.
+        number: usize,
+    },
+    /// A compound in a compound with a name.
+    #[error("part {number} of a compound has the name '{name}' and is a compound itself; name its parts instead")]
+    CompoundName {
+        /// Its number, from 1.
+        number: usize,
+        /// The name.
+        name: String,
+    },
     /// A compound of parts with and without a density.
     #[error("part {number} of a compound has {} density, unlike part 1; give all parts one or none", if *has { "a" } else { "no" })]
     PartDensity {

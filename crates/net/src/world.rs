@@ -62,6 +62,7 @@ pub fn contacts(world: &World) -> Vec<Contact> {
         Some(Contact {
             a: *index.get(&(c.a, c.part_a))?,
             b: *index.get(&(c.b, c.part_b))?,
+            shapes: [c.shape_a as u32, c.shape_b as u32],
             point: c.point.into(),
             normal: c.normal.into(),
             depth: c.depth,
@@ -85,6 +86,7 @@ pub fn events(world: &World) -> Vec<RecordedEvent> {
         kind: kind(event).to_owned(),
         a: name(world, event.a, event.part_a),
         b: event.b.map(|b| name(world, b, event.part_b)),
+        shapes: [event.shape_a as u32, event.shape_b as u32],
         impulse: event.impulse.into(),
         point: event.point.into(),
     };
@@ -97,21 +99,9 @@ pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
     let entities: Vec<(ObjectId, usize)> = sites(world).collect();
     let point = |c: &Contact| {
         let (&(a, part_a), &(b, part_b)) = (entities.get(c.a as usize)?, entities.get(c.b as usize)?);
-        let (point, normal, force, zero) = (c.point.into(), c.normal.into(), c.force.into(), Vec3::zeros());
-        Some(ContactPoint {
-            a,
-            part_a,
-            shape_a: 0,
-            b,
-            part_b,
-            shape_b: 0,
-            point,
-            normal,
-            depth: c.depth,
-            velocity: zero,
-            impulse: zero,
-            force,
-        })
+        let [shape_a, shape_b] = c.shapes.map(|shape| shape as usize);
+        let sides = [(a, part_a, shape_a), (b, part_b, shape_b)];
+        Some(ContactPoint::shown(sides, c.point.into(), c.normal.into(), c.depth, c.force.into()))
     };
     world.replica().set_contacts(contacts.iter().filter_map(point));
 }

@@ -55,7 +55,7 @@ def check_transforms(message, log_time, frame):
 
 
 def check_state(message, log_time, frame):
-    assert message.version == 3 and message.frame == frame, message
+    assert message.version == 4 and message.frame == frame, message
     near(message.time_s, frame / 240, "time")
     assert round(message.time_s * 1e9) == log_time
     assert message.payload == struct.pack("<QQ", frame, frame * frame)

@@ -76,7 +76,7 @@ def test_contacts_are_recorded_and_replayed(tmp_path):
     assert sorted(run.names[k] for k in contact["bodies"]) == ["ball", "ground"]
     assert abs(contact["force"][2]) == pytest.approx(2 * 9.81) and contact["point"] == pytest.approx([0, 0, 0], abs=1e-6)
     *_, last = tumble.replay(tmp_path / "run.mcap", resting())
-    for field in ("bodies", "parts", "point", "normal", "depth", "force"):
+    for field in ("bodies", "parts", "shapes", "point", "normal", "depth", "force"):
         assert (last.contacts[field] == world.contacts[field]).all()
 
 

@@ -1,6 +1,7 @@
 //! Elements and attributes of an XML file. All problems are recorded, as in
 //! [`Fields`](crate::parse::fields::Fields) for TOML.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
@@ -190,6 +191,25 @@ impl<'a, 'd> Element<'a, 'd> {
             return Some([f64::NAN; N]);
         }
         array
+    }
+}
+
+/// Returns the name of a shape; none if it is empty.
+pub(crate) fn shape_name(element: &Element<'_, '_>) -> Option<String> {
+    element.text("name").filter(|name| !name.is_empty()).map(str::to_owned)
+}
+
+/// Reports each shape with the name of an earlier one. `owner` says whose shapes they are.
+pub(crate) fn check_names<'a, 'd: 'a>(elements: impl Iterator<Item = Element<'a, 'd>>, owner: &str) {
+    let mut known: BTreeMap<String, Element<'a, 'd>> = BTreeMap::new();
+    for (element, name) in elements.filter_map(|element| Some((element, shape_name(&element)?))) {
+        match known.get(&name) {
+            Some(first) => element.problem(
+                format_args!("has the name of the one at {}", first.place()),
+                format!("expected different names of the shapes of {owner}"),
+            ),
+            None => drop(known.insert(name, element)),
+        }
     }
 }
 

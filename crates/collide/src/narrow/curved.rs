@@ -5,8 +5,9 @@
 //! rotations, as for a cylinder. On its side, tip and lowest point are the ends of a line, and the core
 //! of the latter is on the axis.
 
+use super::half_space::push_point;
 use crate::shape::{Cone, axis, ellipsoid};
-use crate::{Contact, NormalFrom, Pose, Vec3};
+use crate::{Contact, Pose, Vec3};
 
 /// Sine of the tilt below which the lowest rim point is not distinguished from the fixed ones.
 const LEVEL_TILT: f64 = 1e-4;
@@ -20,21 +21,16 @@ pub(super) fn ellipsoid_half_space(half: &Vec3, pose_a: &Pose, pose_b: &Pose, ma
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let down = -pose_a.rotation.inverse_transform_vector(&normal);
     let core_a = ellipsoid::mean_radius(half, &down);
-    push(
-        pose_a * nalgebra::Point3::from(ellipsoid::support_point(half, &down)),
-        core_a,
-        0,
-        (normal, origin),
-        margin,
-        out,
-    );
+    let lowest = pose_a * nalgebra::Point3::from(ellipsoid::support_point(half, &down));
+    push_point(lowest.coords, (core_a, 0), (normal, origin), margin, out);
 }
 
 pub(super) fn cone_half_space(cone: &Cone, pose_a: &Pose, pose_b: &Pose, margin: f64, out: &mut Vec<Contact>) {
     let (normal, origin) = (axis(pose_b), pose_b.translation.vector);
     let down = -pose_a.rotation.inverse_transform_vector(&normal);
     let mut push = |local: Vec3, core: f64, feature: u64| {
-        push(pose_a * nalgebra::Point3::from(local), core, feature, (normal, origin), margin, out);
+        let at = pose_a * nalgebra::Point3::from(local);
+        push_point(at.coords, (core, feature), (normal, origin), margin, out);
     };
     let (across, along) = cone.side_normal();
     let tilt = down.xy().norm();
@@ -50,30 +46,5 @@ pub(super) fn cone_half_space(cone: &Cone, pose_a: &Pose, pose_b: &Pose, margin:
             .into_iter()
             .enumerate()
             .for_each(|(n, w)| push(rim(w), 0.0, n as u64 + 2));
-    }
-}
-
-/// Appends the contact of a point of A, if within `margin`.
-fn push(
-    at: nalgebra::Point3<f64>,
-    core_a: f64,
-    feature: u64,
-    (normal, origin): (Vec3, Vec3),
-    margin: f64,
-    out: &mut Vec<Contact>,
-) {
-    let gap = normal.dot(&(at.coords - origin));
-    if gap <= margin {
-        let point = at.coords - normal * (0.5 * gap);
-        out.push(Contact {
-            point,
-            normal,
-            gap,
-            feature,
-            core_a,
-            core_b: 0.0,
-            normal_from: NormalFrom::FaceOfB,
-            shapes: [0; 2],
-        });
     }
 }

@@ -4,8 +4,9 @@
 //! rim points fixed in the body, so that a standing cylinder keeps its contacts under small
 //! rotations. A cylinder on its side rests on the two lowest points, whose core is the axis.
 
+use super::half_space::push_point;
 use crate::shape::axis;
-use crate::{Contact, NormalFrom, Pose, Vec3};
+use crate::{Contact, Pose, Vec3};
 
 /// Sine of the tilt below which the lowest rim point is not distinguished from the fixed ones (it
 /// is lower by 0.3 of this, in radii).
@@ -32,20 +33,7 @@ pub(super) fn half_space(
         let middle = pose_a.translation.vector + up * (side * half_length);
         let mut push = |direction: Vec3, n: usize| {
             let rim = middle + direction * radius;
-            let gap = normal.dot(&(rim - origin));
-            if gap <= margin {
-                let (feature, point) = ((8 * face + n) as u64, rim - normal * (0.5 * gap));
-                out.push(Contact {
-                    point,
-                    normal,
-                    gap,
-                    feature,
-                    core_a,
-                    core_b: 0.0,
-                    normal_from: NormalFrom::FaceOfB,
-                    shapes: [0; 2],
-                });
-            }
+            push_point(rim, (core_a, (8 * face + n) as u64), (normal, origin), margin, out);
         };
         if tilt > LEVEL_TILT {
             push(down / tilt, 0);

@@ -54,3 +54,20 @@ pub(super) fn cuboid(half: &Vec3, pose_a: &Pose, pose_b: &Pose, margin: f64, out
         push(center + rotation * local, 0.0, &normal, &origin, corner, margin, out);
     }
 }
+
+/// Appends the contact of a point of a curved surface with the plane, if within `margin`: its core radius there and its
+/// feature.
+pub(super) fn push_point(
+    at: Vec3,
+    (core_a, feature): (f64, u64),
+    (normal, origin): (Vec3, Vec3),
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
+    let gap = normal.dot(&(at - origin));
+    if gap <= margin {
+        let point = at - normal * (0.5 * gap);
+        let normal_from = NormalFrom::FaceOfB;
+        out.push(Contact { point, normal, gap, feature, core_a, core_b: 0.0, normal_from, shapes: [0; 2] });
+    }
+}

@@ -13,6 +13,7 @@ use super::Shape;
 use crate::{Aabb, CylinderShape, MassProperties, Mat3, MeshShape, Pose, ShapeError, TriMesh, Vec3};
 use nalgebra::Translation3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 /// Maximum number of parts: each is compared with all others once.
@@ -36,12 +37,21 @@ pub struct CompoundPart {
     pub pose: Pose,
     /// Density, kg/m³; all parts of a compound have one or none has.
     pub density: Option<f64>,
+    /// Name, not empty, unlike that of all other parts; a part that is a compound has none.
+    pub name: Option<String>,
 }
 
 impl CompoundPart {
-    /// Returns a part without a density of its own.
+    /// Returns a part without a name and a density of its own.
     pub fn new(shape: Shape, pose: Pose) -> CompoundPart {
-        CompoundPart { shape, pose, density: None }
+        CompoundPart { shape, pose, density: None, name: None }
+    }
+
+    /// Sets the name, by which contacts, hits and events report the part.
+    #[must_use]
+    pub fn with_name(mut self, name: impl Into<String>) -> Self {
+        self.name = Some(name.into());
+        self
     }
 
     /// Sets the density, kg/m³.
@@ -76,7 +86,7 @@ impl CompoundShape {
     ///
     /// # Errors
     /// [`ShapeError`]: no part or more than 4096, a half-space, a pose that is not finite, a density
-    /// that is not above 0, or parts with and without a density.
+    /// that is not above 0, parts with and without a density, two parts of one name, or an empty name.
     pub fn new(parts: Vec<CompoundPart>) -> Result<CompoundShape, ShapeError> {
         let parts = flattened(parts)?;
         if parts.is_empty() || parts.len() > MAX_PARTS {
@@ -93,6 +103,7 @@ impl CompoundShape {
                 return Err(ShapeError::PartDensity { number: n + 1, has: part.density.is_some() });
             }
         }
+        check_names(&parts)?;
         let placed = |part: &CompoundPart| part.pose * Translation3::from(part.shape.center_of_mass());
         let (mut mass, mut volume, mut moment) = (0.0, 0.0, Vec3::zeros());
         let mut own = Vec::with_capacity(parts.len());
@@ -226,6 +237,13 @@ impl CompoundShape {
         })
     }
 
+    /// Returns the same compound with `link/` before the names of its parts.
+    pub(super) fn with_names_in(&self, link: &str) -> CompoundShape {
+        let mut named = self.clone();
+        named.parts.iter_mut().filter_map(|part| part.name.as_mut()).for_each(|name| *name = format!("{link}/{name}"));
+        named
+    }
+
     /// Returns the surfaces of all parts as triangles, in the frame of the compound; round parts with
     /// 48 sides. For drawing.
     pub fn mesh(&self) -> TriMesh {
@@ -237,6 +255,31 @@ impl CompoundShape {
             all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
         }
         all
+    }
+}
+
+/// Numbers and names of the shapes of which a shape consists.
+impl Shape {
+    /// Returns how many shapes it consists of: the parts of a compound, 1 for all others.
+    pub fn part_count(&self) -> usize {
+        if let Shape::Compound(compound) = self { compound.parts().len() } else { 1 }
+    }
+
+    /// Returns the name of a compound's part; `None` for a part without one and for all other shapes.
+    pub fn part_name(&self, part: usize) -> Option<&str> {
+        let Shape::Compound(compound) = self else { return None };
+        compound.parts().get(part)?.name.as_deref()
+    }
+
+    /// Returns a shape with `link/` before the names of a compound's parts; the same one if they have none.
+    #[must_use]
+    pub fn with_names_in(&self, link: &str) -> Shape {
+        match self {
+            Shape::Compound(compound) if compound.parts().iter().any(|part| part.name.is_some()) => {
+                Shape::Compound(Arc::new(compound.with_names_in(link)))
+            }
+            other => other.clone(),
+        }
     }
 }
 
@@ -255,6 +298,20 @@ fn surface(shape: &Shape) -> TriMesh {
     }
 }
 
+/// Checks that no name is empty and that none occurs twice.
+fn check_names(parts: &[CompoundPart]) -> Result<(), ShapeError> {
+    let mut known = BTreeMap::new();
+    for (n, name) in parts.iter().enumerate().filter_map(|(n, part)| Some((n, part.name.as_ref()?))) {
+        if name.is_empty() {
+            return Err(ShapeError::EmptyName { number: n + 1 });
+        }
+        if let Some(first) = known.insert(name, n) {
+            return Err(ShapeError::PartNames { first: first + 1, second: n + 1, name: name.clone() });
+        }
+    }
+    Ok(())
+}
+
 /// Replaces compounds by their parts. A density of a compound is the mean of its parts'.
 fn flattened(parts: Vec<CompoundPart>) -> Result<Vec<CompoundPart>, ShapeError> {
     let mut flat = Vec::with_capacity(parts.len());
@@ -266,10 +323,14 @@ fn flattened(parts: Vec<CompoundPart>) -> Result<Vec<CompoundPart>, ShapeError> 
             flat.push(part);
             continue;
         };
+        if let Some(name) = part.name {
+            return Err(ShapeError::CompoundName { number: flat.len() + 1, name });
+        }
         let mean = inner.own_density;
         flat.extend(inner.parts.iter().map(|own| CompoundPart {
             shape: own.shape.clone(),
             pose: part.pose * own.pose,
+            name: own.name.clone(),
             density: match (part.density, mean) {
                 (Some(density), Some(mean)) => own.density.map(|own| own * density / mean),
                 (given, None) => given,
@@ -321,7 +382,7 @@ impl Serialize for CompoundShape {
                 // neither is a part
                 Shape::HalfSpace | Shape::Compound(_) => StoredShape::Sphere(0.0),
             };
-            (shape, part.pose, part.density)
+            (shape, part.pose, part.density, part.name.clone())
         };
         self.parts.iter().map(stored).collect::<Vec<_>>().serialize(serializer)
     }
@@ -329,8 +390,8 @@ impl Serialize for CompoundShape {
 
 impl<'de> Deserialize<'de> for CompoundShape {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<CompoundShape, D::Error> {
-        let stored = Vec::<(StoredShape, Pose, Option<f64>)>::deserialize(deserializer)?;
-        let part = |(shape, pose, density)| {
+        let stored = Vec::<(StoredShape, Pose, Option<f64>, Option<String>)>::deserialize(deserializer)?;
+        let part = |(shape, pose, density, name)| {
             let shape = match shape {
                 StoredShape::Sphere(radius) => Shape::Sphere { radius },
                 StoredShape::Box(half_extents) => Shape::Box { half_extents },
@@ -342,7 +403,7 @@ impl<'de> Deserialize<'de> for CompoundShape {
                 StoredShape::RoundedBox(half_extents, rounding) => Shape::RoundedBox { half_extents, rounding },
                 StoredShape::RoundedCylinder(core, rounding) => Shape::RoundedCylinder { core, rounding },
             };
-            CompoundPart { shape, pose, density }
+            CompoundPart { shape, pose, density, name }
         };
         CompoundShape::new(stored.into_iter().map(part).collect()).map_err(serde::de::Error::custom)
     }

@@ -4,9 +4,9 @@
 use super::records::{LoadedTables, Tables, VisualRecord, shape};
 use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
-use crate::object::Material;
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
+use crate::object::{Material, ShapeMaterials};
 use crate::object::{Object, Renderable};
 use crate::{ArticulatedBody, Coupling, DofSettings, LockedAxes, Model, RigidBody};
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,7 @@ pub(super) struct RigidRecord {
     mass: Option<(f64, Mat3)>,
     material: Material,
     shape_materials: Vec<(usize, Material)>,
+    shape_name: Option<String>,
     linear_damping: f64,
     angular_damping: f64,
     gravity_scale: f64,
@@ -47,6 +48,7 @@ impl RigidRecord {
             mass: (!body.is_fixed()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
             shape_materials: body.shape_materials().to_vec(),
+            shape_name: body.shape_name.clone(),
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
             gravity_scale: body.gravity_scale,
@@ -75,6 +77,7 @@ impl RigidRecord {
         for (shape, material) in self.shape_materials {
             body.set_shape_material(shape, Some(material));
         }
+        body.shape_name = self.shape_name;
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
         (body.linear_damping, body.angular_damping) = (self.linear_damping, self.angular_damping);
         (body.gravity_scale, body.locked) = (self.gravity_scale, self.locked);
@@ -102,11 +105,14 @@ struct ColliderRecord {
     contact_mode: ContactMode,
     group: CollisionGroup,
     mask: u64,
+    name: Option<String>,
+    shape_materials: ShapeMaterials,
+    one_way: Option<Vec3>,
 }
 
 impl ColliderRecord {
     fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
-        let Collider { pose, shape, material, contact_mode, group, mask } = collider;
+        let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way } = collider;
         ColliderRecord {
             link,
             pose: *pose,
@@ -115,12 +121,27 @@ impl ColliderRecord {
             contact_mode: *contact_mode,
             group: *group,
             mask: *mask,
+            name: name.clone(),
+            shape_materials: shape_materials.clone(),
+            one_way: *one_way,
         }
     }
 
     fn collider(self, tables: &LoadedTables) -> Result<(Option<usize>, Collider), ArchiveError> {
-        let ColliderRecord { link, pose, shape: index, material, contact_mode, group, mask } = self;
-        Ok((link, Collider { pose, shape: shape(&tables.shapes, index)?, material, contact_mode, group, mask }))
+        let ColliderRecord {
+            link,
+            pose,
+            shape: index,
+            material,
+            contact_mode,
+            group,
+            mask,
+            name,
+            shape_materials,
+            one_way,
+        } = self;
+        let shape = shape(&tables.shapes, index)?;
+        Ok((link, Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way }))
     }
 }
 

@@ -34,6 +34,7 @@ struct Outline {
     volume: f64,
     center: Vec3,
     radius: f64,
+    names: Vec<Option<String>>,
 }
 
 impl World {
@@ -110,5 +111,6 @@ fn outline(shape: &Shape) -> Outline {
         volume: if bounded { shape.volume() } else { 0.0 },
         center: shape.center_of_mass(),
         radius: if bounded { shape.bounding_radius() } else { 0.0 },
+        names: (0..shape.part_count()).map(|part| shape.part_name(part).map(str::to_owned)).collect(),
     }
 }

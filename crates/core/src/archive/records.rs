@@ -194,6 +194,7 @@ impl ContactRecord {
 pub(super) struct EventRecord {
     kind: EventKind,
     sides: [(Option<u32>, usize); 2],
+    shapes: [usize; 2],
     /// Impulse, point.
     vectors: [Vec3; 2],
 }
@@ -203,6 +204,7 @@ impl EventRecord {
         EventRecord {
             kind: e.kind,
             sides: [(indices.of_id(e.a), e.part_a), (e.b.and_then(|b| indices.of_id(b)), e.part_b)],
+            shapes: [e.shape_a, e.shape_b],
             vectors: [e.impulse, e.point],
         }
     }
@@ -210,8 +212,9 @@ impl EventRecord {
     pub fn event(self, ids: &[ObjectId]) -> Event {
         let [(a, part_a), (b, part_b)] = self.sides;
         let [impulse, point] = self.vectors;
+        let [shape_a, shape_b] = self.shapes;
         let b = b.map(|b| id(ids, Some(b)));
-        Event { kind: self.kind, a: id(ids, a), part_a, b, part_b, impulse, point }
+        Event { part_a, shape_a, part_b, shape_b, impulse, point, ..Event::of(self.kind, id(ids, a), b) }
     }
 }
 

@@ -11,18 +11,17 @@
 //! The generalized velocity is `v`. The articulated inertias give the root of the mass matrix, `M =
 //! LᵀL`.
 
+use super::collider::{Collider, LinkCollider};
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::algorithms::free_motion::FreeMotion;
-use crate::articulated::model::Model;
 use crate::articulated::model::dof::{Coupling, DofSettings};
-use crate::object::Material;
-use crate::object::collidable::CollisionGroup;
+use crate::articulated::model::{Model, ModelError};
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::part_state::Wrench;
 use crate::object::visual::Visual;
-use crate::{Anchor, ObjectId};
+use crate::{Anchor, BodyError, ObjectId};
 use nalgebra::{Quaternion, Translation3};
-use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
+use tumble_collide::{Pose, Quat, Vec3};
 
 /// An invalid articulated body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,6 +63,24 @@ pub enum ArticulatedError {
         /// Number of degrees of freedom.
         count: usize,
     },
+    /// A shape of a link is not valid.
+    #[error("articulated body '{body}', link '{link}': {why}")]
+    Collider {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+        /// Reason.
+        why: BodyError,
+    },
+    /// The tree of links is not valid with a constant.
+    #[error("articulated body '{body}': {why}")]
+    Model {
+        /// Body.
+        body: String,
+        /// Reason.
+        why: ModelError,
+    },
     /// Numbers are not valid positions or velocities.
     #[error("articulated body '{body}': {what} must be {expected} finite numbers, quaternions of unit length")]
     Start {
@@ -74,48 +91,6 @@ pub enum ArticulatedError {
         /// Required number of values.
         expected: usize,
     },
-}
-
-/// A shape on a link.
-#[derive(Clone, Debug)]
-pub struct Collider {
-    /// Pose of the shape in the frame of its link; for a mesh, the pose of its file's frame.
-    /// [`add_collider`](ArticulatedBody::add_collider) replaces it by the pose of the part's frame
-    /// in the frame of the moving link; for a mesh that frame is at the center of mass.
-    pub pose: Pose,
-    /// Geometry.
-    pub shape: Shape,
-    /// Surface constants.
-    pub material: Material,
-    /// How a mesh or cylinder collides.
-    pub contact_mode: ContactMode,
-    /// Collision group of the part.
-    pub group: CollisionGroup,
-    /// Groups that the part collides with, one bit each.
-    pub mask: u64,
-}
-
-impl Collider {
-    /// Makes a collider with the default material that collides with every group.
-    pub fn new(shape: Shape, pose: Pose) -> Collider {
-        Collider {
-            pose,
-            shape,
-            material: Material::default(),
-            contact_mode: ContactMode::default(),
-            group: CollisionGroup::default(),
-            mask: u64::MAX,
-        }
-    }
-}
-
-/// A collider with its link.
-#[derive(Clone)]
-pub(super) struct LinkCollider {
-    /// Moving link; `None` for the base.
-    pub link: Option<usize>,
-    /// The collider, with its pose in the frame of the link or base.
-    pub collider: Collider,
 }
 
 /// A tree of links that moves as one object. See the module for its state.
@@ -257,11 +232,20 @@ impl ArticulatedBody {
     }
 
     /// Adds a shape to the link of that name, which may be a fixed link that is folded into its
-    /// parent.
+    /// parent. Then its names become `LINK/NAME`, and the shape is one of the parent, or of the first link on the base.
     ///
     /// # Errors
-    /// [`ArticulatedError::NoLink`].
+    /// [`ArticulatedError::NoLink`]; [`ArticulatedError::Collider`] for a name that another shape of the link has, surface
+    /// constants of a part that the shape does not have, and a one-way direction without a length.
     pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
+        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        let carrier = frame.link;
+        self.name_within(link, carrier, &mut collider);
+        self.check_collider(carrier, &collider).map_err(|why| ArticulatedError::Collider {
+            body: self.name.clone(),
+            link: link.into(),
+            why,
+        })?;
         let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
         let center = Translation3::from(collider.shape.center_of_mass());
         collider.pose = frame.pose * (collider.pose * center);
@@ -355,6 +339,19 @@ impl ArticulatedBody {
         Ok(())
     }
 
+    /// Sets the [`armature`](super::Link::armature) of the joint that moves a link, kg·m² or kg. In a world
+    /// [`World::set_armature`](crate::World::set_armature) does it.
+    ///
+    /// # Errors
+    /// [`ArticulatedError`]: there is no such moving link, its joint has no armature, or the value is out of its range.
+    pub fn with_armature(mut self, link: &str, armature: f64) -> Result<Self, ArticulatedError> {
+        let Some(number) = self.model.link(link) else { return Err(self.no_link(link)) };
+        match self.model.set_armature(number, armature) {
+            Ok(()) => Ok(self),
+            Err(why) => Err(ArticulatedError::Model { body: self.name, why }),
+        }
+    }
+
     /// Couples one degree of freedom to another.
     ///
     /// # Errors
@@ -415,6 +412,10 @@ impl ArticulatedBody {
     /// Returns the collider of a part, if it has one.
     pub(super) fn collider(&self, part: usize) -> Option<&LinkCollider> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)
+    }
+
+    pub(super) fn collider_mut(&mut self, part: usize) -> Option<&mut LinkCollider> {
+        self.colliders.get_mut(part.checked_sub(self.model.links().len() + 1)?)
     }
 
     /// Returns the parent of a link, skipping massless links of stacked joints. `None` is the base.

@@ -1,75 +1,16 @@
 //! An articulated body from links with shapes, in code.
 
-use super::body::{ArticulatedBody, ArticulatedError, Collider};
+use super::body::{ArticulatedBody, ArticulatedError};
+use super::builder_error::ArticulationError;
+use super::collider::Collider;
 use super::model::dof::{Coupling, DofSettings, Drive, Spring};
 use super::model::joint::Joint;
-use super::model::{LinkMass, ModelBuilder, ModelError};
+use super::model::{LinkMass, ModelBuilder};
 use crate::RigidBody;
 use crate::object::visual::Visual;
 use crate::object::{Appearance, Material};
 use nalgebra::Translation3;
-use tumble_collide::{Pose, Shape, ShapeError};
-
-/// Why an articulated body cannot be built.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ArticulationError {
-    /// The parent of a link was not added before it.
-    #[error("articulated body '{body}', link '{link}': its parent '{parent}' was not added before it; {known}")]
-    Parent {
-        /// Body.
-        body: String,
-        /// Link.
-        link: String,
-        /// Name given as the parent.
-        parent: String,
-        /// A sentence with the names of the links before it.
-        known: String,
-    },
-    /// The mass of a shape cannot be computed.
-    #[error("articulated body '{body}', link '{link}': {why}")]
-    Shape {
-        /// Body.
-        body: String,
-        /// Link.
-        link: String,
-        /// Reason.
-        why: ShapeError,
-    },
-    /// A link has a mass, and no shape over which it is distributed.
-    #[error(
-        "articulated body '{body}', link '{link}': it has a mass but no shape over which it is distributed; give it a shape, or mass, center and inertia"
-    )]
-    NoShape {
-        /// Body.
-        body: String,
-        /// Link.
-        link: String,
-    },
-    /// A setting does not fit the joint of a link.
-    #[error("articulated body '{body}', link '{link}': {what}, and its joint has {dof} degrees of freedom")]
-    Joint {
-        /// Body.
-        body: String,
-        /// Link.
-        link: String,
-        /// The setting.
-        what: &'static str,
-        /// Degrees of freedom of the joint.
-        dof: usize,
-    },
-    /// The tree of links is not valid.
-    #[error("articulated body '{body}': {why}")]
-    Model {
-        /// Body.
-        body: String,
-        /// Reason.
-        why: ModelError,
-    },
-    /// A constant is not valid.
-    #[error(transparent)]
-    Body(#[from] ArticulatedError),
-}
+use tumble_collide::{Pose, Shape, Vec3};
 
 /// The mass of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +23,17 @@ enum Mass {
     Given(LinkMass),
 }
 
+/// The purpose of a shape of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Use {
+    /// It is only drawn and has mass.
+    Drawn,
+    /// It collides with the surface of its link.
+    Collides,
+    /// It collides with a surface of its own.
+    HasSurface,
+}
+
 /// A link of an [`ArticulationBuilder`]: its joint, its shapes and its mass.
 ///
 /// A link with shapes has by default the density of water; a link without shapes has no mass.
@@ -92,7 +44,7 @@ pub struct LinkBuilder {
     parent: Option<String>,
     joint: Joint,
     pose: Pose,
-    shapes: Vec<(Collider, bool)>,
+    shapes: Vec<(Collider, Use)>,
     mass: Mass,
     dof: DofSettings,
     armature: f64,
@@ -138,13 +90,36 @@ impl LinkBuilder {
 
     /// Adds a shape that collides and is drawn, at a pose in the frame of the link.
     pub fn with_shape(mut self, shape: Shape, pose: Pose) -> Self {
-        self.shapes.push((Collider::new(shape, pose), true));
+        self.shapes.push((Collider::new(shape, pose), Use::Collides));
+        self
+    }
+
+    /// Adds a shape that collides and is drawn, with surface constants, groups and a name of its own.
+    pub fn with_collider(mut self, collider: Collider) -> Self {
+        self.shapes.push((collider, Use::HasSurface));
+        self
+    }
+
+    /// Sets the name of the shape that was added last.
+    pub fn with_shape_name(mut self, name: impl Into<String>) -> Self {
+        if let Some((collider, _)) = self.shapes.last_mut() {
+            collider.name = Some(name.into());
+        }
         self
     }
 
     /// Adds a shape that is drawn and has mass, and does not collide.
     pub fn with_visual_shape(mut self, shape: Shape, pose: Pose) -> Self {
-        self.shapes.push((Collider::new(shape, pose), false));
+        self.shapes.push((Collider::new(shape, pose), Use::Drawn));
+        self
+    }
+
+    /// Makes the shape that was added last collide on one side only: with what comes against `direction` (any length above
+    /// 0, the frame of the shape).
+    pub fn with_one_way(mut self, direction: Vec3) -> Self {
+        if let Some((collider, _)) = self.shapes.last_mut() {
+            collider.one_way = Some(direction);
+        }
         self
     }
 
@@ -462,13 +437,16 @@ impl ArticulationBuilder {
 }
 
 fn add_shapes(body: &mut ArticulatedBody, link: &LinkBuilder) -> Result<(), ArticulatedError> {
-    for (collider, collides) in &link.shapes {
+    for (collider, kind) in &link.shapes {
         let center = Translation3::from(collider.shape.center_of_mass());
         let visual = Visual::shape(0, collider.pose * center, collider.shape.clone(), link.appearance.clone());
         body.add_visual(&link.name, visual)?;
-        if *collides {
-            body.add_collider(&link.name, Collider { material: link.material, ..collider.clone() })?;
-        }
+        let collider = match kind {
+            Use::Drawn => continue,
+            Use::Collides => collider.clone().with_material(link.material),
+            Use::HasSurface => collider.clone(),
+        };
+        body.add_collider(&link.name, collider)?;
     }
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! The traits of objects for the articulated body: dynamics, collisions, visuals and
 //! synchronization.
 
-use super::body::{ArticulatedBody, BodyCache, LinkCollider};
+use super::body::{ArticulatedBody, BodyCache};
+use super::collider::LinkCollider;
+use super::shapes::name_of;
 use crate::articulated::algorithms::dynamics::Dynamics;
 use crate::articulated::algorithms::energy::{energy, momentum};
 use crate::articulated::algorithms::kinematics::Kinematics;
@@ -30,7 +32,10 @@ impl Object for ArticulatedBody {
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
-        let BodyCache { dynamics, zeros, accelerations, .. } = cache.get();
+        let BodyCache { dynamics, free_motion, zeros, accelerations, .. } = cache.get();
+        // they may have changed, and a cache may be that of a fork with others
+        dynamics.set_armatures(&self.model);
+        free_motion.set_armatures(&self.model);
         let (q, v) = x.split_at(self.model.positions());
         dynamics.refresh(q, v);
         let links = self.model.links().len();
@@ -290,6 +295,18 @@ impl Collidable for ArticulatedBody {
 
     fn material(&self, part: usize) -> Material {
         self.collider(part).map_or(Material::default(), |p| p.collider.material)
+    }
+
+    fn shape_materials(&self, part: usize) -> &[(usize, Material)] {
+        self.collider(part).map_or(&[], |p| p.collider.shape_materials.as_slice())
+    }
+
+    fn shape_name(&self, part: usize, shape: usize) -> Option<&str> {
+        name_of(&self.collider(part)?.collider, shape)
+    }
+
+    fn one_way(&self, part: usize) -> Option<Vec3> {
+        self.collider(part)?.collider.one_way?.try_normalize(0.0)
     }
 
     fn collision_group(&self, part: usize) -> CollisionGroup {

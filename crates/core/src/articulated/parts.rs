@@ -1,6 +1,7 @@
 //! The parts of an articulated body besides its model and its dof settings, for archives.
 
-use super::body::{ArticulatedBody, ArticulatedError, Collider, LinkCollider};
+use super::body::{ArticulatedBody, ArticulatedError};
+use super::collider::{Collider, LinkCollider};
 use crate::articulated::model::dof::Coupling;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;

@@ -68,6 +68,11 @@ pub trait Collidable {
         let _ = part;
         &[]
     }
+    /// Returns the name of a shape of a part, which contacts report by its index: a compound's part, or 0. None by
+    /// default, except for parts of a compound with names.
+    fn shape_name(&self, part: usize, shape: usize) -> Option<&str> {
+        self.shape(part)?.part_name(shape)
+    }
     /// Returns the collision group of a part.
     fn collision_group(&self, part: usize) -> CollisionGroup {
         let _ = part;

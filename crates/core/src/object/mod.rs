@@ -20,6 +20,7 @@ pub(crate) mod mesh_key;
 pub(crate) mod mounts;
 pub(crate) mod net_sync;
 pub(crate) mod part_state;
+mod shape_materials;
 pub(crate) mod visual;
 
 pub use appearance::Appearance;
@@ -34,6 +35,7 @@ pub use intersect::Intersect;
 pub use material::{Combine, Material};
 pub use mounts::{CameraCarrier, LightCarrier};
 pub use net_sync::{NetSync, SyncError};
+pub use shape_materials::ShapeMaterials;
 pub use visual::Renderable;
 
 use crate::archive::{ObjectIndices, ObjectRecord};

@@ -5,7 +5,7 @@ use super::{BodyError, LockedAxes};
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
-use crate::object::{Intersect, Material};
+use crate::object::{Intersect, Material, ShapeMaterials};
 use nalgebra::Translation3;
 use std::sync::Arc;
 use tumble_collide::{ContactMode, Mat3, Pose, Shape, Vec3};
@@ -61,7 +61,9 @@ pub struct RigidBody {
     pub(super) lights: Vec<LightMount>,
     pub(super) intersect: Option<Arc<dyn Intersect>>,
     /// Constants of parts of its compound, ascending.
-    pub(super) shape_materials: Vec<(usize, Material)>,
+    pub(super) shape_materials: ShapeMaterials,
+    /// Name of a shape that is no compound.
+    pub(crate) shape_name: Option<String>,
 }
 
 impl RigidBody {
@@ -121,7 +123,8 @@ impl RigidBody {
             cameras: Vec::new(),
             lights: Vec::new(),
             intersect: None,
-            shape_materials: Vec::new(),
+            shape_materials: ShapeMaterials::default(),
+            shape_name: None,
         }
     }
 
@@ -276,24 +279,35 @@ impl RigidBody {
     /// Sets the constants of one shape, or removes them. A body in a world is changed by
     /// [`World::change_body`](crate::World::change_body).
     pub fn set_shape_material(&mut self, shape: usize, material: Option<Material>) {
-        let found = self.shape_materials.binary_search_by_key(&shape, |(own, _)| *own);
-        match (found, material) {
-            (Ok(at), Some(material)) => self.shape_materials[at].1 = material,
-            (Ok(at), None) => drop(self.shape_materials.remove(at)),
-            (Err(at), Some(material)) => self.shape_materials.insert(at, (shape, material)),
-            (Err(_), None) => {}
-        }
+        self.shape_materials.set(shape, material);
     }
 
     /// Returns the constants of the surface of one shape: its own, or those of the body.
     pub fn shape_material(&self, shape: usize) -> Material {
-        let found = self.shape_materials.binary_search_by_key(&shape, |(own, _)| *own);
-        found.map_or(self.material, |at| self.shape_materials[at].1)
+        self.shape_materials.get(shape).unwrap_or(self.material)
     }
 
     /// Returns the shapes with constants of their own, ascending.
     pub fn shape_materials(&self) -> &[(usize, Material)] {
-        &self.shape_materials
+        self.shape_materials.as_slice()
+    }
+
+    /// Sets the name of its shape. A compound has none: its [parts](tumble_collide::CompoundPart::with_name) have.
+    #[must_use]
+    pub fn with_shape_name(mut self, name: impl Into<String>) -> Self {
+        self.shape_name = Some(name.into());
+        self
+    }
+
+    /// Returns the name of a shape, by the number that contacts report: a part of its compound, or 0.
+    pub fn shape_name(&self, shape: usize) -> Option<&str> {
+        let own = self.shape_name.as_deref().filter(|_| shape == 0);
+        own.or_else(|| self.shape.part_name(shape))
+    }
+
+    /// Returns the number of the shape of that name.
+    pub fn shape_named(&self, name: &str) -> Option<usize> {
+        (0..self.shape.part_count()).find(|&shape| self.shape_name(shape) == Some(name))
     }
 
     /// Sets how its mesh or cylinder collides.
@@ -411,12 +425,15 @@ impl RigidBody {
         };
         let unit = self.initial_pose.rotation.norm();
         let parts = if let Shape::Compound(compound) = &self.shape { compound.parts().len() } else { 0 };
-        for material in std::iter::once(&self.material).chain(self.shape_materials.iter().map(|(_, own)| own)) {
+        for material in std::iter::once(&self.material).chain(self.shape_materials().iter().map(|(_, own)| own)) {
             material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
         }
-        if let Some((shape, _)) = self.shape_materials.last() {
+        if let Some((shape, _)) = self.shape_materials().last() {
             let expected = "below the number of parts of the body's compound";
             range("index of a shape with a material", *shape as f64, *shape < parts, expected)?;
+        }
+        if let Some(name) = &self.shape_name {
+            check_shape_name(name, &self.shape)?;
         }
         range("linear damping", self.linear_damping, self.linear_damping >= 0.0, "at least 0")?;
         range("angular damping", self.angular_damping, self.angular_damping >= 0.0, "at least 0")?;
@@ -430,5 +447,15 @@ impl RigidBody {
             .iter()
             .flat_map(|v| v.iter())
             .try_for_each(|&value| range("a position or velocity", value, true, "finite"))
+    }
+}
+
+/// Checks the name of a whole shape.
+pub(crate) fn check_shape_name(name: &str, shape: &Shape) -> Result<(), BodyError> {
+    let wrong = |expected| Err(BodyError::ShapeName { name: name.into(), expected });
+    match shape {
+        Shape::Compound(_) => wrong("a compound has no name of its own: name its parts"),
+        _ if name.is_empty() => wrong("it must have a letter, or be left out"),
+        _ => Ok(()),
     }
 }

@@ -25,6 +25,24 @@ pub enum BodyError {
         /// Admissible range.
         expected: &'static str,
     },
+    /// Two shapes of one body, or of one link, have the same name.
+    #[error("shapes {first} and {second} are both named '{name}'; give the shapes of one body or link different names")]
+    ShapeNames {
+        /// Number of the first one, from 0, as contacts report it.
+        first: usize,
+        /// Number of the second one.
+        second: usize,
+        /// The name.
+        name: String,
+    },
+    /// The name of a shape is not valid.
+    #[error("the name of a shape is '{name}'; {expected}")]
+    ShapeName {
+        /// The name.
+        name: String,
+        /// The name that is expected.
+        expected: &'static str,
+    },
     /// The shape has no mass properties of its own, for the reason that it gives.
     #[error("{0}")]
     Shape(String),

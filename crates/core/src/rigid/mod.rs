@@ -29,6 +29,7 @@ mod state;
 mod turning;
 
 pub use body::RigidBody;
+pub(crate) use body::check_shape_name;
 pub use error::BodyError;
 pub use locked::LockedAxes;
 pub(crate) use state::{orientation, vec3};

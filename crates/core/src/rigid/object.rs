@@ -429,7 +429,11 @@ impl Collidable for RigidBody {
     }
 
     fn shape_materials(&self, _part: usize) -> &[(usize, Material)] {
-        &self.shape_materials
+        self.shape_materials.as_slice()
+    }
+
+    fn shape_name(&self, _part: usize, shape: usize) -> Option<&str> {
+        self.shape_name(shape)
     }
 
     fn collision_group(&self, _part: usize) -> CollisionGroup {

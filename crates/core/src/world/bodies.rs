@@ -1,6 +1,7 @@
 //! Access to the objects of a world between steps.
 
 use super::{World, WorldError};
+use crate::ArticulatedBody;
 use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Integratable, Intersect, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
@@ -18,6 +19,12 @@ impl World {
     /// [`add`](Self::add)).
     pub fn name(&self, id: ObjectId) -> Option<&str> {
         self.core.table.get(id).map(|placed| &*placed.name)
+    }
+
+    /// Returns the name of a shape, by its object, part and number as contacts, hits and events report them; `None` for a
+    /// shape without one and for a removed object.
+    pub fn shape_name(&self, id: ObjectId, part: usize, shape: usize) -> Option<&str> {
+        self.object(id)?.collidable()?.shape_name(part, shape)
     }
 
     /// Returns an object by id, as its own type; `None` if it was removed or has another type.
@@ -190,6 +197,26 @@ impl World {
             let w = (target.rotation * orientation(x).inverse()).scaled_axis() / dt;
             body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]);
         })
+    }
+
+    /// Sets the [`armature`](crate::articulated::Link::armature) of the joint that moves a link of an articulated body, kg·m² or kg.
+    /// Positions and velocities stay.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed or is not an articulated body, the link does not exist or does not move, its
+    /// joint has no armature, or the value is out of its range. Nothing is changed then.
+    pub fn set_armature(&mut self, id: ObjectId, link: &str, armature: f64) -> Result<(), WorldError> {
+        self.core.wake(id);
+        let core = &mut self.core;
+        let entry = core.table.get(id).ok_or(WorldError::Stale)?;
+        let any: &dyn std::any::Any = entry.object.as_ref();
+        let old = any.downcast_ref::<ArticulatedBody>();
+        let old = old.ok_or_else(|| WorldError::NotArticulated(entry.name.to_string()))?;
+        let new = old.clone().with_armature(link, armature)?;
+        let place = core.table.place(id).ok_or(WorldError::Stale)?;
+        core.table.placed[place].object = Box::new(new);
+        core.integration().refresh_one(id);
+        Ok(())
     }
 
     /// Changes constants of a rigid body: mass, inertia, center of mass, damping, locked axes. The

@@ -13,6 +13,19 @@ impl World {
 }
 
 impl ContactPoint {
+    /// Makes a contact that is only shown: between two shapes, each as object, part and number, with point (m), normal from
+    /// `b` to `a`, depth (m) and force on `a` (N). Velocity and impulse are zero.
+    pub fn shown(
+        [(a, part_a, shape_a), (b, part_b, shape_b)]: [(ObjectId, usize, usize); 2],
+        point: Vec3,
+        normal: Vec3,
+        depth: f64,
+        force: Vec3,
+    ) -> ContactPoint {
+        let (velocity, impulse) = (Vec3::zeros(), Vec3::zeros());
+        ContactPoint { a, part_a, shape_a, b, part_b, shape_b, point, normal, depth, velocity, impulse, force }
+    }
+
     /// Returns whether the surfaces touch: they overlap or an impulse acts. Contacts are also
     /// detected within a margin, before surfaces touch.
     pub fn is_touching(&self) -> bool {

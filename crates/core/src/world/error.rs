@@ -1,6 +1,7 @@
 //! Errors of calls to a world.
 
 use super::script::EventError;
+use crate::articulated::ArticulatedError;
 use crate::constraint::mimic::MimicError;
 use crate::rigid::BodyError;
 use crate::settings::SettingsError;
@@ -37,6 +38,12 @@ pub enum WorldError {
     /// The call needs a rigid body.
     #[error("'{0}' is not a rigid body")]
     NotRigid(String),
+    /// The call needs an articulated body.
+    #[error("'{0}' is not an articulated body")]
+    NotArticulated(String),
+    /// A constant of an articulated body is not valid.
+    #[error(transparent)]
+    Articulated(#[from] ArticulatedError),
     /// Two joints cannot be coupled like that.
     #[error(transparent)]
     Mimic(#[from] MimicError),

@@ -63,10 +63,15 @@ pub struct Event {
     pub a: ObjectId,
     /// Part of `a`.
     pub part_a: usize,
+    /// Shape of that part at the contact point with the largest impulse, as in [`ContactPoint`]; 0 for all but contacts
+    /// that begin or persist.
+    pub shape_a: usize,
     /// The other object; `None` for sleep and joints.
     pub b: Option<ObjectId>,
     /// Part of `b`.
     pub part_b: usize,
+    /// Shape of that part.
+    pub shape_b: usize,
     /// Impulse on `a` over the frame, N·s, world axes; zero for all but contacts that begin or
     /// persist.
     pub impulse: Vec3,
@@ -75,6 +80,12 @@ pub struct Event {
 }
 
 impl Event {
+    /// Returns an event of the first parts of two objects, without an impulse.
+    pub(crate) fn of(kind: EventKind, a: ObjectId, b: Option<ObjectId>) -> Event {
+        let zero = Vec3::zeros();
+        Event { kind, a, part_a: 0, shape_a: 0, b, part_b: 0, shape_b: 0, impulse: zero, point: zero }
+    }
+
     /// Returns whether an object takes part.
     pub(crate) fn names(&self, id: ObjectId) -> bool {
         self.a == id || self.b == Some(id)
@@ -106,6 +117,7 @@ struct Touch {
     /// On the first side, N·s.
     impulse: Vec3,
     point: Vec3,
+    shapes: [u32; 2],
 }
 
 /// The contacts of the sub-steps of a frame.
@@ -131,6 +143,8 @@ struct Pair {
     ids: [ObjectId; 2],
     impulse: Vec3,
     point: Vec3,
+    /// Shapes that touch at the point.
+    shapes: [u32; 2],
     /// Norm of the impulse at the point.
     most: f64,
 }
@@ -194,6 +208,7 @@ impl Core {
             ids: [c.a, c.b],
             impulse: impulse(c),
             point: c.point,
+            shapes: constraint.contact.shapes,
         }));
     }
 
@@ -216,6 +231,7 @@ impl Core {
             ids: [constraint.a, constraint.b].map(|part| owners[part as usize].id),
             impulse,
             point: constraint.contact.point,
+            shapes: constraint.contact.shapes,
         }));
         touches.done = touches.list.len();
     }
@@ -246,13 +262,15 @@ impl Core {
                 Some(_) => EventKind::ContactPersist,
                 None => EventKind::ContactBegin,
             };
-            let ([a, b], [_, part_a, _, part_b]) = (p.ids, p.pair);
+            let ([a, b], [_, part_a, _, part_b], [shape_a, shape_b]) = (p.ids, p.pair, p.shapes);
             self.events.push(Event {
                 kind,
                 a,
                 part_a: part_a as usize,
+                shape_a: shape_a as usize,
                 b: Some(b),
                 part_b: part_b as usize,
+                shape_b: shape_b as usize,
                 impulse: p.impulse,
                 point: p.point,
             });
@@ -298,6 +316,7 @@ impl Core {
             let [a, part_a, b, part_b] = touch.pair;
             (touch.pair, touch.impulse) = ([b, part_b, a, part_a], -touch.impulse);
             touch.ids.swap(0, 1);
+            touch.shapes.swap(0, 1);
         }
         touches.sort_by_key(|touch| touch.pair);
         let mut pairs: Vec<Pair> = Vec::new();
@@ -307,12 +326,12 @@ impl Core {
                 Some(last) => {
                     last.impulse += touch.impulse;
                     if norm > last.most {
-                        (last.most, last.point) = (norm, touch.point);
+                        (last.most, last.point, last.shapes) = (norm, touch.point, touch.shapes);
                     }
                 }
                 None => {
-                    let Touch { pair, ids, impulse, point } = *touch;
-                    pairs.push(Pair { pair, ids, impulse, point, most: norm });
+                    let Touch { pair, ids, impulse, point, shapes } = *touch;
+                    pairs.push(Pair { pair, ids, impulse, point, shapes, most: norm });
                 }
             }
         }
@@ -341,9 +360,8 @@ impl Core {
     fn add_event(&mut self, kind: EventKind, [a, part_a, b, part_b]: [u32; 4]) {
         let (Some(a), Some(b)) = (self.by_serial(a), self.by_serial(b)) else { return };
         let (a, b) = (self.table.order[a], Some(self.table.order[b]));
-        let zero = Vec3::zeros();
         let (part_a, part_b) = (part_a as usize, part_b as usize);
-        self.events.push(Event { kind, a, part_a, b, part_b, impulse: zero, point: zero });
+        self.events.push(Event { part_a, part_b, ..Event::of(kind, a, b) });
     }
 
     fn add_sleep_events(&mut self, before: &WorldState) {
@@ -359,8 +377,7 @@ impl Core {
 
     /// Returns an event of one object.
     fn event_of_one(&self, kind: EventKind, place: usize) -> Event {
-        let (a, zero) = (self.table.order[place], Vec3::zeros());
-        Event { kind, a, part_a: 0, b: None, part_b: 0, impulse: zero, point: zero }
+        Event::of(kind, self.table.order[place], None)
     }
 
     /// Returns the pairs of a sensor and a part that overlaps it, sorted.

@@ -3,7 +3,7 @@
 //! | topic | message |
 //! |---|---|
 //! | `/tumble/sensors` | an object with an array of numbers for each sensor: `{"imu": [0, 0, 9.81]}` |
-//! | `/tumble/events` | `{"events": [{"kind": "contact_begin", "a": "ground", "b": "ball", "impulse": [0, 0, -1], "point": [0, 0, 0]}]}` |
+//! | `/tumble/events` | `{"events": [{"kind": "contact_begin", "a": "ground", "b": "ball", "shapes": [0, 0], "impulse": [0, 0, -1], "point": [0, 0, 0]}]}` |
 //!
 //! A frame without any has no message. Both come before the state message of their frame and have its log time. Readers of
 //! earlier versions skip them.
@@ -29,7 +29,7 @@ const JSON_SCHEMA: &str = "jsonschema";
 pub const MAX_EVENTS: usize = 4096;
 
 const SENSORS_TEXT: &str = r#"{"title": "tumble.Sensors", "type": "object", "additionalProperties": {"type": "array", "items": {"type": "number"}}}"#;
-const EVENTS_TEXT: &str = r#"{"title": "tumble.Events", "type": "object", "properties": {"events": {"type": "array", "items": {"type": "object", "properties": {"kind": {"type": "string"}, "a": {"type": "string"}, "b": {"type": "string"}, "impulse": {"type": "array", "items": {"type": "number"}}, "point": {"type": "array", "items": {"type": "number"}}}}}}}"#;
+const EVENTS_TEXT: &str = r#"{"title": "tumble.Events", "type": "object", "properties": {"events": {"type": "array", "items": {"type": "object", "properties": {"kind": {"type": "string"}, "a": {"type": "string"}, "b": {"type": "string"}, "shapes": {"type": "array", "items": {"type": "integer"}}, "impulse": {"type": "array", "items": {"type": "number"}}, "point": {"type": "array", "items": {"type": "number"}}}}}}}"#;
 
 /// Readings of sensors by their names.
 pub type Readings = BTreeMap<String, Vec<f64>>;
@@ -44,6 +44,8 @@ pub struct RecordedEvent {
     /// Name of the other entity, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub b: Option<String>,
+    /// Shapes of `a` and `b` at the point: indices of the parts of compounds, else 0.
+    pub shapes: [u32; 2],
     /// Impulse on `a` over the frame, N·s, world axes.
     pub impulse: [f64; 3],
     /// Point, world axes, m.

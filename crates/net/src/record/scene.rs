@@ -123,6 +123,8 @@ pub struct Contact {
     pub a: u32,
     /// Index of the entity that the normal points from.
     pub b: u32,
+    /// Shapes of `a` and `b` that touch: indices of the parts of compounds, 0 for all other shapes.
+    pub shapes: [u32; 2],
     /// Contact point, m.
     pub point: [f64; 3],
     /// Unit normal from `b` to `a`.
@@ -135,7 +137,7 @@ pub struct Contact {
 
 impl Contact {
     /// Length of an encoded contact, bytes.
-    const BYTES: usize = 88;
+    const BYTES: usize = 96;
 
     fn numbers(&self) -> [f64; 10] {
         let Contact { point: p, normal: n, depth, force: f, .. } = self;
@@ -153,12 +155,12 @@ impl Contact {
     }
 }
 
-/// Encodes contacts: the two indices (u32), then point, normal, depth and force (f64),
+/// Encodes contacts: the two indices and the two shapes (u32), then point, normal, depth and force (f64),
 /// little-endian.
 pub fn encode_contacts(contacts: &[Contact]) -> Vec<u8> {
     let mut out = Vec::with_capacity(Contact::BYTES * contacts.len());
     for contact in contacts {
-        out.extend([contact.a, contact.b].iter().flat_map(|i| i.to_le_bytes()));
+        out.extend([contact.a, contact.b, contact.shapes[0], contact.shapes[1]].iter().flat_map(|i| i.to_le_bytes()));
         out.extend(contact.numbers().iter().flat_map(|x| x.to_le_bytes()));
     }
     out
@@ -175,11 +177,19 @@ pub fn decode_contacts(bytes: &[u8]) -> std::result::Result<Vec<Contact>, String
         ));
     }
     let read = |bytes: &[u8; Contact::BYTES]| {
-        let (indices, numbers) = bytes.split_at(8);
+        let (indices, numbers) = bytes.split_at(16);
         let index = |i: usize| indices.as_chunks().0.get(i).map_or(0, |b| u32::from_le_bytes(*b));
         let number = |i: usize| numbers.as_chunks().0.get(i).map_or(0.0, |b| f64::from_le_bytes(*b));
         let vector = |i: usize| [number(i), number(i + 1), number(i + 2)];
-        Contact { a: index(0), b: index(1), point: vector(0), normal: vector(3), depth: number(6), force: vector(7) }
+        Contact {
+            a: index(0),
+            b: index(1),
+            shapes: [index(2), index(3)],
+            point: vector(0),
+            normal: vector(3),
+            depth: number(6),
+            force: vector(7),
+        }
     };
     Ok(contacts.iter().map(read).collect())
 }

@@ -36,7 +36,7 @@ pub(crate) const PROTOBUF: &str = "protobuf";
 /// Name of the metadata record that marks a recording of tumble.
 pub(crate) const METADATA_NAME: &str = "tumble";
 /// Version of the recording's layout.
-pub(crate) const VERSION: u32 = 3;
+pub(crate) const VERSION: u32 = 4;
 
 /// The state message, as text. Every file contains it twice: compiled, as the channel's schema, and
 /// as this text.
@@ -49,11 +49,11 @@ package tumble;
 
 // One frame of a simulation. The schema's name takes the place of a magic number.
 message State {
-  fixed32 version = 1;  // layout of this message: 3
+  fixed32 version = 1;  // layout of this message: 4
   fixed64 frame = 2;    // frame number, strictly increasing within a file
   double time_s = 3;    // simulated time in seconds from 0, not rounded; the log time is this in whole nanoseconds
   bytes payload = 4;    // the state, opaque here; little-endian
-  bytes contacts = 5;   // 88 bytes each, little-endian: indices of entities a and b in /tf (2 u32); point, normal from b to a, depth, force on a (10 f64)
+  bytes contacts = 5;   // 96 bytes each, little-endian: indices of entities a and b in /tf, shapes of a and b (4 u32); point, normal from b to a, depth, force on a (10 f64)
   bytes chain = 6;      // BLAKE3 of the chain of the frame before (none for the first), frame, time_s and payload: 32 bytes
 }
 "#;
@@ -202,9 +202,9 @@ mod tests {
     #[test]
     fn state_bytes_are_as_documented() {
         let state =
-            State { version: 3, frame: 0x0102, time_s: 0.5, payload: vec![7, 8], contacts: vec![9], chain: vec![5] };
+            State { version: 4, frame: 0x0102, time_s: 0.5, payload: vec![7, 8], contacts: vec![9], chain: vec![5] };
         let wire = [
-            &[0x0d, 3, 0, 0, 0][..],
+            &[0x0d, 4, 0, 0, 0][..],
             &[0x11, 2, 1, 0, 0, 0, 0, 0, 0],
             &[0x19, 0, 0, 0, 0, 0, 0, 0xe0, 0x3f],
             &[0x22, 2, 7, 8],

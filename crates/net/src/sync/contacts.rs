@@ -1,11 +1,11 @@
 //! Contacts in a STATE message, for overlays of facets.
 //!
 //! ```text
-//! count u32 | count times: object a u32, part u32, object b u32, part u32, point 3 f32, normal 3 f32, depth f32, force 3 f32
+//! count u32 | count times: object a u32, part u32, shape u32, object b u32, part u32, shape u32, point 3 f32, normal 3 f32, depth f32, force 3 f32
 //! ```
 //!
 //! Objects are indices of the object table; the normal points from b to a, and the force acts on a
-//! (N, m, world axes). Contacts with objects that are not in the table are left out. A facet shows
+//! (N, m, world axes). A shape is the index of a compound's part, 0 for all others. Contacts with objects that are not in the table are left out. A facet shows
 //! them and computes nothing with them.
 
 use super::wire::{ByteReader, MessageError};
@@ -27,7 +27,8 @@ pub(crate) fn put_contacts<'a>(
     let mut count = 0u32;
     for c in contacts {
         let (Some(a), Some(b)) = (index.get(&c.a), index.get(&c.b)) else { continue };
-        out.extend([*a, c.part_a as u32, *b, c.part_b as u32].iter().flat_map(|i| i.to_le_bytes()));
+        let sides = [*a, c.part_a as u32, c.shape_a as u32, *b, c.part_b as u32, c.shape_b as u32];
+        out.extend(sides.iter().flat_map(|i| i.to_le_bytes()));
         let numbers = c.point.iter().chain(&c.normal).chain([&c.depth]).chain(&c.force);
         out.extend(numbers.flat_map(|x| (*x as f32).to_le_bytes()));
         count += 1;
@@ -51,34 +52,24 @@ pub(crate) fn get_contacts(
     }
     let mut contacts = Vec::with_capacity(count);
     for _ in 0..count {
-        let (a, part_a) = part(&mut rest, ids, world)?;
-        let (b, part_b) = part(&mut rest, ids, world)?;
+        let sides = [side(&mut rest, ids, world)?, side(&mut rest, ids, world)?];
         let (point, normal, depth, force) =
             (vector(&mut rest)?, vector(&mut rest)?, number(&mut rest)?, vector(&mut rest)?);
-        let (velocity, impulse) = (Vec3::zeros(), Vec3::zeros());
-        contacts.push(ContactPoint {
-            a,
-            part_a,
-            shape_a: 0,
-            b,
-            part_b,
-            shape_b: 0,
-            point,
-            normal,
-            depth,
-            velocity,
-            impulse,
-            force,
-        });
+        contacts.push(ContactPoint::shown(sides, point, normal, depth, force));
     }
     rest.end()?;
     Ok(contacts)
 }
 
-fn part(rest: &mut ByteReader<'_>, ids: &[Option<ObjectId>], world: &World) -> Result<(ObjectId, usize), MessageError> {
-    let (object, part) = (rest.u32()? as usize, rest.u32()? as usize);
+/// Reads object, part and shape of one side.
+fn side(
+    rest: &mut ByteReader<'_>,
+    ids: &[Option<ObjectId>],
+    world: &World,
+) -> Result<(ObjectId, usize, usize), MessageError> {
+    let (object, part, shape) = (rest.u32()? as usize, rest.u32()? as usize, rest.u32()? as usize);
     let id = ids.get(object).copied().flatten().filter(|&id| world.part_state(id, part).is_some());
-    id.map(|id| (id, part)).ok_or(MessageError::Malformed("a contact of an unknown part"))
+    id.map(|id| (id, part, shape)).ok_or(MessageError::Malformed("a contact of an unknown part"))
 }
 
 fn number(rest: &mut ByteReader<'_>) -> Result<f64, MessageError> {

@@ -88,7 +88,11 @@ fn a_world_with_long_names_is_recorded() {
 fn contacts_are_recorded_and_shown_again() {
     let mut world = World::default();
     world.add(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
-    world.add(RigidBody::new(Shape::sphere(0.1).unwrap()).with_pose(Pose::translation(0.0, 0.0, 0.1))).unwrap();
+    // the ball is the second shape of its compound, the first one hangs above it and weighs next to nothing
+    let above = CompoundPart::new(Shape::sphere(1e-4).unwrap(), Pose::translation(0.0, 0.0, 0.2));
+    let ball = CompoundPart::new(Shape::sphere(0.1).unwrap(), Pose::identity());
+    let ball = Shape::compound(vec![above, ball]).unwrap();
+    world.add(RigidBody::new(ball).with_pose(Pose::translation(0.0, 0.0, 0.1))).unwrap();
     let scratch = Scratch::new("contacts");
     let path = scratch.file("a.mcap");
     let mut recorder = Recorder::create(&path, "", &entities(&world), RecorderOptions::default()).unwrap();
@@ -106,6 +110,7 @@ fn contacts_are_recorded_and_shown_again() {
     recorder.finish().unwrap();
     let last = read(&path).unwrap().last().unwrap().unwrap();
     assert_eq!(last.contacts, contacts(&world));
+    assert_eq!(last.contacts[0].shapes, if last.contacts[0].a == 1 { [1, 0] } else { [0, 1] });
     assert!((last.contacts[0].force[2].abs() - weight()).abs() < 1e-6);
     let shown = world.contacts().to_vec();
     world.restore(&last.state).unwrap();
@@ -113,6 +118,7 @@ fn contacts_are_recorded_and_shown_again() {
     show_contacts(&mut world, &last.contacts);
     for (shown, before) in world.contacts().iter().zip(&shown) {
         assert_eq!((shown.a, shown.b, shown.point, shown.normal), (before.a, before.b, before.point, before.normal));
+        assert_eq!([shown.shape_a, shown.shape_b], [before.shape_a, before.shape_b]);
         assert_eq!((shown.depth, shown.force), (before.depth, before.force));
     }
     assert_eq!(world.contacts().len(), shown.len());

@@ -152,6 +152,7 @@ fn readings_and_events_come_back_with_their_frames() {
         kind: "contact_begin".into(),
         a: "ball".into(),
         b: (k == 3).then(|| "ground".into()),
+        shapes: [k as u32, 7],
         impulse: [0.0, 0.0, k as f64],
         point: [1.0 / 3.0, 0.0, 0.0],
     };

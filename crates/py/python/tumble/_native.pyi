@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import disjoint_base
+from typing_extensions import Self, disjoint_base
 
 from tumble._extension import Behavior, Force, Intersect
 from tumble._values import Energy, Event, Firing, LinkSpheres, Momentum, SphereLevel
@@ -100,6 +100,14 @@ class Shape:
         """Radius of the smallest sphere about the shape's origin that contains it, meters; infinite
         for a half-space.
         """
+    @property
+    def name(self) -> str | None:
+        """The name that ``named`` gave it, or None."""
+    def named(self, name: str) -> Self:
+        """Returns the same shape with a name, by which contacts, hits and events report it.
+
+        The shapes of one body, or of one link, must have different names. A ``Compound`` has no name: its parts have.
+        """
 
 @final
 class Sphere(Shape):
@@ -126,7 +134,7 @@ class Compound(Shape):
 
     parts: tuples ``(shape, position)``, ``(shape, position, orientation)`` or ``(shape, position,
     orientation, density)``: position of the shape's origin, meters; orientation: quaternion
-    (x, y, z, w) or None; density: kg/m³, for all parts or for none. A body made without mass and
+    (x, y, z, w) or None; density: kg/m³, for all parts or for none. A part has the name of its shape: ``shape.named``. A body made without mass and
     density has these densities. Parts may overlap; mass and volume of an overlap then count for
     each. The frame of its body is that of the positions.
     """
@@ -408,14 +416,21 @@ class RigidBody:
         """Force with which surfaces in contact attract each other, N, at least 0. The larger of a pair counts."""
     @adhesion.setter
     def adhesion(self, value: float) -> None: ...
-    def shape_material(self, shape: int) -> dict[str, Any]:
+    @property
+    def shape_names(self) -> list[str | None]:
+        """Names of its shapes by the numbers that contacts and hits report, the parts of a ``Compound``; None for those
+        without one.
+        """
+    def shape_number(self, name: str) -> int:
+        """Returns the number of the shape of that name."""
+    def shape_material(self, shape: int | str) -> dict[str, Any]:
         """Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
 
-        shape: index of the part of a ``Compound``, as ``shapes`` of contacts has it.
+        shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
         """
     def set_shape_material(
         self,
-        shape: int,
+        shape: int | str,
         *,
         friction: float | None = None,
         restitution: float | None = None,
@@ -430,7 +445,7 @@ class RigidBody:
     ) -> None:
         """Sets surface constants of one shape, the part of a ``Compound``, by the names of the properties of the body.
 
-        shape: index of the part. Constants that are not given stay as they are, for a shape without its own those of
+        shape: name or index of the part. Constants that are not given stay as they are, for a shape without its own those of
         the body at this time. Without any, the shape has those of the body again.
         """
     @property
@@ -1202,9 +1217,11 @@ class ArticulationBuilder:
         orientation: ArrayLike | None = None,
         *,
         collides: bool = True,
+        one_way: ArrayLike | None = None,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
-        collides, or is only drawn; both count for the mass.
+        collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
+        shape that collides on one side only, as in ``World.add_rigid``.
         """
     def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
         """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
@@ -1345,6 +1362,52 @@ class Articulation:
         """Dry friction of each degree of freedom, shape (dof,), N·m or N. Settable like ``joint_damping``."""
     @joint_friction.setter
     def joint_friction(self, value: ArrayLike) -> None: ...
+    @property
+    def armature(self) -> _Floats:
+        """Armature of each degree of freedom, shape (dof,), kg·m² or kg: the inertia of the rotor of its joint, as the joint meets
+        it; 0 for floating roots. Settable like ``joint_damping``: velocities stay. A number is for all joints that have
+        one; those of a spherical joint are the same.
+        """
+    @armature.setter
+    def armature(self, value: ArrayLike) -> None: ...
+    @property
+    def shape_names(self) -> list[list[str | None]]:
+        """Names of the shapes that collide, by links as in ``link_names`` and by the numbers that contacts and hits report;
+        None for those without one.
+
+        A fixed link has none: its shapes are those of the link that carries it, named ``link/name``, and those of links
+        fixed to the base are shapes of the first one.
+        """
+    def shape_number(self, link: str, name: str) -> int:
+        """Returns the number of the shape of that name on a link, which may be a fixed one; that of contacts with the link, or
+        with the link that carries it.
+        """
+    def shape_material(self, link: str, shape: int | str) -> dict[str, Any]:
+        """Returns the surface constants of one shape of a link: a dict by the names of ``set_shape_material``.
+
+        shape: name, or number as ``shapes`` of contacts has it.
+        """
+    def set_shape_material(
+        self,
+        link: str,
+        shape: int | str,
+        *,
+        friction: float | None = None,
+        restitution: float | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
+    ) -> None:
+        """Sets surface constants of one shape of a link of a body in a world, by the names of ``RigidBody.set_shape_material``.
+
+        shape: name, or number as ``shapes`` of contacts has it. Constants that are not given stay as they are. Without any,
+        a part of a ``Compound`` has those of the compound again.
+        """
     @property
     def stiffness(self) -> _Floats:
         """Stiffness of the spring of each degree of freedom, shape (dof,), N·m/rad or N/m; 0 without one. Settable like
@@ -2177,7 +2240,7 @@ class World:
 
         Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
         for articulated bodies the indices of the links in their ``link_names``; ``shapes`` (2,), as
-        ``shape`` in ``cast_rays``; ``point`` (3,), m;
+        ``shape`` in ``cast_rays``, whose names ``shape_name`` returns; ``point`` (3,), m;
         ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
         apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
         m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
@@ -2211,13 +2274,14 @@ class World:
     @property
     def events(self) -> list[Event]:
         """The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
-        ``impulse``, ``point``.
+        ``impulse``, ``point``, ``shapes``, ``shape_names``.
 
         kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
         ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
         of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
         ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
-        acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes.
+        acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes. shapes, shape_names: the shapes
+        that touch there, as in ``contacts``, and their names.
 
         Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
         at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact
@@ -2238,6 +2302,11 @@ class World:
         """
     @max_turn.setter
     def max_turn(self, value: float) -> None: ...
+    def shape_name(self, body: int | _Body, part: int, shape: int) -> str | None:
+        """Returns the name of a shape, or None if it has none, by the numbers that ``contacts`` and queries report.
+
+        body: number in ``bodies``, a handle or a name; part, shape: the numbers beside it.
+        """
     def cast_rays(
         self,
         origins: ArrayLike,

@@ -16,7 +16,9 @@ from tumble._errors import InvalidValueError, UnknownNameError
 from tumble._native import World, read_recording, show_contacts
 from tumble._pictures import Camera
 
-_CONTACT = np.dtype([("bodies", "<u4", (2,)), ("point", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("force", "<f8", (3,))])
+_CONTACT = np.dtype(
+    [("bodies", "<u4", (2,)), ("shapes", "<u4", (2,)), ("point", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("force", "<f8", (3,))]
+)
 
 
 class RecordedEvent(NamedTuple):
@@ -32,6 +34,8 @@ class RecordedEvent(NamedTuple):
     """Impulse on ``a`` over the step, N·s."""
     point: tuple[float, float, float]
     """Point with the largest impulse, m."""
+    shapes: tuple[int, int]
+    """Numbers of the shapes at the point: indices of the parts of compounds, 0 for all other shapes."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +58,7 @@ class Recording:
     """Snapshot of each frame for ``World.restore``."""
     contacts: list[NDArray[np.void]]
     """Contacts of each frame whose surfaces touch, at most 4096, those with the largest forces: a structured array with ``bodies`` (2,),
-    indices in ``names``; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
+    indices in ``names``; ``shapes`` (2,), indices of the parts of compounds, else 0; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
     sensors: dict[str, NDArray[np.float64]]
     """Readings of each measuring sensor by its name, shape (n, k); NaN while it did not exist."""
     events: list[list[RecordedEvent]]
@@ -134,7 +138,7 @@ def read(path: str | PathLike[str]) -> Recording:
     arrays = read_recording(path)
     arrays["contacts"] = [np.frombuffer(contacts, _CONTACT) for contacts in arrays["contacts"]]
     arrays["events"] = [
-        [RecordedEvent(kind, a, b, tuple(impulse), tuple(point)) for kind, a, b, impulse, point in events] for events in arrays["events"]
+        [RecordedEvent(kind, a, b, tuple(impulse), tuple(point), shapes) for kind, a, b, impulse, point, shapes in events] for events in arrays["events"]
     ]
     return Recording(**arrays)
 

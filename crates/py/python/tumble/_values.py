@@ -59,6 +59,10 @@ class Event(NamedTuple):
     """Impulse on ``a`` over the step, world axes, shape (3,), N·s; zero for all but contacts that begin or persist."""
     point: NDArray[np.float64]
     """The contact point with the largest impulse, world, shape (3,), m; zero like the impulse."""
+    shapes: tuple[int, int]
+    """The numbers of the shapes that touch at the point, as in ``World.contacts``; 0 like the impulse."""
+    shape_names: tuple[str | None, str | None]
+    """The names of these shapes; None for those without one, and without an impulse."""
 
 
 class Firing(NamedTuple):

@@ -66,7 +66,10 @@ fn name_of(part: &IntersectPart) -> String {
 /// Makes the `IntersectPart` of Python.
 fn part<'py>(py: Python<'py>, part: &IntersectPart) -> Result<Bound<'py, PyAny>> {
     let words = format!("<tumble.Shape of '{}'>", name_of(part));
-    let shape = Shape::of_record(py, ShapeRecord { solid: part.shape.clone(), placement: Pose::identity(), words })?;
+    let shape = Shape::of_record(
+        py,
+        ShapeRecord { solid: part.shape.clone(), placement: Pose::identity(), name: None, words },
+    )?;
     let (position, orientation) = (vector(py, &part.pose.translation.vector), quaternion(py, &part.pose.rotation));
     let matrix = array(py, part.pose.rotation.to_rotation_matrix().matrix().transpose().as_slice());
     let matrix = matrix.call_method1("reshape", ((3, 3),))?;

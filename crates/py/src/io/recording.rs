@@ -245,7 +245,8 @@ pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<
         sensors.set_item(name, PyArray1::from_vec(py, column).reshape([frames, length])?)?;
     }
     dict.set_item("sensors", sensors)?;
-    let event = |e: &RecordedEvent| (e.kind.clone(), e.a.clone(), e.b.clone(), e.impulse, e.point);
+    let event =
+        |e: &RecordedEvent| (e.kind.clone(), e.a.clone(), e.b.clone(), e.impulse, e.point, (e.shapes[0], e.shapes[1]));
     let events: Vec<Vec<_>> = all.events.iter().map(|events| events.iter().map(event).collect()).collect();
     dict.set_item("events", events)?;
     dict.set_item("world", world)?;

@@ -325,7 +325,8 @@ impl Articulation {
     ) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
         let gravity = self.spot.gravity()?;
-        let out = py.detach(|| self.robot.forward_dynamics(&gravity, &mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.forward_dynamics(&gravity, &mut rows))?;
         result(py, &rows, out, &[self.robot.dof()])
     }
 
@@ -346,7 +347,8 @@ impl Articulation {
         let mut rows =
             self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
         let gravity = self.spot.gravity()?;
-        let out = py.detach(|| self.robot.inverse_dynamics(&gravity, &mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.inverse_dynamics(&gravity, &mut rows))?;
         result(py, &rows, out, &[self.robot.dof()])
     }
 
@@ -354,7 +356,8 @@ impl Articulation {
     #[pyo3(signature = (q=None))]
     fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
-        let out = py.detach(|| self.robot.mass_matrix(&mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.mass_matrix(&mut rows))?;
         result(py, &rows, out, &[self.robot.dof(); 2])
     }
 

@@ -178,8 +178,10 @@ impl ArticulationBuilder {
     }
 
     /// Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
-    /// collides, or is only drawn; both count for the mass.
-    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collides=true))]
+    /// collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
+    /// shape that collides on one side only, as in ``World.add_rigid``.
+    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collides=true, one_way=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
         link: &str,
@@ -187,11 +189,14 @@ impl ArticulationBuilder {
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         collides: bool,
+        one_way: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         self.has(link)?;
+        let direction = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         let mut builder = self.builder();
         if let Some(known) = builder.link_mut(link) {
-            *known = with_shape(known.clone(), &shape, position, orientation, collides)?;
+            let with = with_shape(known.clone(), &shape, position, orientation, collides)?;
+            *known = direction.into_iter().fold(with, LinkBuilder::with_one_way);
         }
         Ok(())
     }
@@ -234,7 +239,8 @@ fn with_shape(
     collides: bool,
 ) -> Result<LinkBuilder> {
     let (solid, pose) = (shape.solid.clone(), pose(position, orientation)? * shape.placement);
-    Ok(if collides { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) })
+    let link = if collides { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) };
+    Ok(shape.name.iter().fold(link, LinkBuilder::with_shape_name))
 }
 
 fn with_mass(

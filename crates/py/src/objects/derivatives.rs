@@ -28,7 +28,8 @@ impl Articulation {
         let mut rows =
             self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
         let gravity = self.spot.gravity()?;
-        let out = py.detach(|| self.robot.inverse_dynamics_derivatives(&gravity, &mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.inverse_dynamics_derivatives(&gravity, &mut rows))?;
         result(py, &rows, out, &[3, dof, dof])
     }
 
@@ -48,7 +49,8 @@ impl Articulation {
         let dof = self.robot.dof();
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
         let gravity = self.spot.gravity()?;
-        let out = py.detach(|| self.robot.forward_dynamics_derivatives(&gravity, &mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.forward_dynamics_derivatives(&gravity, &mut rows))?;
         result(py, &rows, out, &[3, dof, dof])
     }
 }

@@ -1,13 +1,31 @@
-//! Damping, dry friction and springs of the joints of an articulation, settable while it runs.
+//! Damping, dry friction, armature and springs of the joints of an articulation, settable while it runs.
 
 use crate::arrays::convert::{bounds, shown};
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
+use crate::objects::binding::Binding;
+use crate::objects::robot::Robot;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tumble::dynamics::{ArticulatedBody, DofSettings, Spring};
+use std::sync::Arc;
+use tumble::dynamics::articulated::Model;
+use tumble::dynamics::{ArticulatedBody, DofSettings, Joint, Spring};
 
 impl Articulation {
+    /// Returns the robot with the armatures that a body in a world has now.
+    pub(super) fn present(&self) -> Result<Arc<Robot>> {
+        let Binding::Placed(place) = &self.spot else { return Ok(self.robot.clone()) };
+        let armatures = |model: &Model| -> Vec<f64> { model.links().iter().map(|link| link.armature).collect() };
+        let changed = place.read(|inner| {
+            let model = inner.world.get::<ArticulatedBody>(place.id)?.model();
+            Some((armatures(model) != armatures(&self.robot.model)).then(|| model.clone()))
+        })?;
+        Ok(match changed {
+            Some(model) => Arc::new(Robot { model, ..Robot::clone(&self.robot) }),
+            None => self.robot.clone(),
+        })
+    }
+
     /// Returns one number of each degree of freedom.
     fn of_dofs<'py>(&self, py: Python<'py>, get: impl Fn(&DofSettings) -> f64) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(PyArray1::from_vec(py, self.spot.dofs()?.iter().map(get).collect()))
@@ -64,6 +82,44 @@ impl Articulation {
     #[setter]
     fn set_joint_friction(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
         self.change_dofs(py, ("joint_friction", value), |dof, friction| DofSettings { friction, ..dof })
+    }
+
+    /// Armature of each degree of freedom, shape (dof,), kg·m² or kg: the inertia of the rotor of its joint, as the joint meets
+    /// it; 0 for floating roots. Settable like ``joint_damping``: velocities stay. A number is for all joints that have
+    /// one; those of a spherical joint are the same.
+    #[getter]
+    fn armature<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        let robot = self.present()?;
+        let links = robot.model.links().iter();
+        let each = links.flat_map(|link| std::iter::repeat_n(link.armature, link.joint.dof()));
+        Ok(PyArray1::from_vec(py, each.collect()))
+    }
+
+    #[setter]
+    fn set_armature(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let (place, each) = (self.in_world()?, self.of_each_dof(("armature", value))?);
+        let one = value.extract::<f64>().is_ok();
+        let links = self.robot.model.links().iter();
+        let rotors = links.filter(|link| !(one && link.joint == Joint::Floating)).map(|link| {
+            let own = &each[link.v..link.v + link.joint.dof()];
+            match own.iter().all(|armature| *armature == own[0]) {
+                true => Ok((link.name.as_str(), own[0])),
+                false => Err(Error::value(format!(
+                    "armature: the joint of link '{}' has one of {own:?}; expected the same for its degrees of freedom",
+                    link.name
+                ))),
+            }
+        });
+        let rotors = rotors.collect::<Result<Vec<_>>>()?;
+        place.write(py, |inner| {
+            let body = inner.world.get::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            // checked as a whole, so that an invalid value changes nothing
+            rotors.iter().try_fold(body.clone(), |body, (link, armature)| body.with_armature(link, *armature))?;
+            for (link, armature) in &rotors {
+                inner.world.set_armature(place.id, link, *armature)?;
+            }
+            Ok(())
+        })
     }
 
     /// Stiffness of the spring of each degree of freedom, shape (dof,), N·m/rad or N/m; 0 without one. Settable like

@@ -61,19 +61,7 @@ impl Articulation {
         (name, value): (&str, &Bound<'_, PyAny>),
         with: impl Fn(DofSettings, f64) -> DofSettings,
     ) -> Result<()> {
-        let (place, dof) = (self.in_world()?, self.robot.dof());
-        let may_be_infinite = ["effort", "max_velocity"].contains(&name);
-        let Numbers { shape, data } = if may_be_infinite { bounds(value, name) } else { numbers(value, name) }?;
-        let each = match shape.as_slice() {
-            [] => vec![data[0]; dof],
-            [n] if *n == dof => data,
-            _ => {
-                return Err(Error::value(format!(
-                    "{name}: expected a number or shape ({dof},), got {}",
-                    shown(&shape)
-                )));
-            }
-        };
+        let (place, each) = (self.in_world()?, self.of_each_dof((name, value))?);
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
             let mut changed = body.clone();
@@ -84,6 +72,18 @@ impl Articulation {
             *body = changed;
             Ok(())
         })
+    }
+
+    /// Converts a number for all degrees of freedom, or one for each.
+    pub(super) fn of_each_dof(&self, (name, value): (&str, &Bound<'_, PyAny>)) -> Result<Vec<f64>> {
+        let dof = self.robot.dof();
+        let may_be_infinite = ["effort", "max_velocity"].contains(&name);
+        let Numbers { shape, data } = if may_be_infinite { bounds(value, name) } else { numbers(value, name) }?;
+        match shape.as_slice() {
+            [] => Ok(vec![data[0]; dof]),
+            [n] if *n == dof => Ok(data),
+            _ => Err(Error::value(format!("{name}: expected a number or shape ({dof},), got {}", shown(&shape)))),
+        }
     }
 
     /// Returns the part that carries a frame.

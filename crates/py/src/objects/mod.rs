@@ -17,6 +17,7 @@ pub mod place;
 pub mod robot;
 pub mod sensor;
 pub mod shape_material;
+pub mod shape_names;
 pub mod shapes;
 pub mod sphere_robot;
 pub mod spheretree;

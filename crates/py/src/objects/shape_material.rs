@@ -1,38 +1,93 @@
-//! Surface constants of single shapes of a body, the parts of a compound.
+//! Surface constants of single shapes of bodies and links.
 
 use crate::arrays::convert::{array, some};
-use crate::errors::Result;
+use crate::errors::{Error, Result};
+use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tumble::dynamics::{ArticulatedBody, Material};
+
+/// Returns constants as a dict.
+fn as_dict<'py>(py: Python<'py>, m: &Material) -> Result<Bound<'py, PyDict>> {
+    let constants = PyDict::new(py);
+    let numbers = [
+        ("friction", m.friction),
+        ("restitution", m.restitution),
+        ("static_friction", m.static_friction),
+        ("stribeck_speed", m.stribeck_speed),
+        ("rolling_friction", m.rolling_friction),
+        ("torsional_friction", m.torsional_friction),
+        ("tangential_restitution", m.tangential_restitution),
+        ("adhesion", m.adhesion),
+    ];
+    numbers.iter().try_for_each(|(name, value)| constants.set_item(name, value))?;
+    constants.set_item("friction_scale", array(py, m.friction_scale.as_slice()))?;
+    constants.set_item("surface_velocity", array(py, m.surface_velocity.as_slice()))?;
+    Ok(constants)
+}
+
+/// Constants that a call sets: the numbers in the order of the arguments, then the vectors.
+struct Given {
+    numbers: [Option<f64>; 8],
+    scale: Option<[f64; 3]>,
+    velocity: Option<[f64; 3]>,
+}
+
+impl Given {
+    fn new(
+        numbers: [Option<f64>; 8],
+        scale: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+    ) -> Result<Given> {
+        let scale = scale.map(|value| some::<3>(value, "friction_scale")).transpose()?;
+        let velocity = velocity.map(|value| some::<3>(value, "surface_velocity")).transpose()?;
+        Ok(Given { numbers, scale, velocity })
+    }
+
+    /// Returns the constants with those that are given; `None` if none is.
+    fn over(&self, mut m: Material) -> Option<Material> {
+        let places = [
+            &mut m.friction,
+            &mut m.restitution,
+            &mut m.static_friction,
+            &mut m.stribeck_speed,
+            &mut m.rolling_friction,
+            &mut m.torsional_friction,
+            &mut m.tangential_restitution,
+            &mut m.adhesion,
+        ];
+        let mut given = self.scale.is_some() || self.velocity.is_some();
+        for (place, number) in places.into_iter().zip(self.numbers) {
+            given |= number.is_some();
+            number.iter().for_each(|number| *place = *number);
+        }
+        self.scale.iter().for_each(|scale| m.friction_scale = (*scale).into());
+        self.velocity.iter().for_each(|velocity| m.surface_velocity = (*velocity).into());
+        given.then_some(m)
+    }
+}
+
+/// A shape that a user names or numbers.
+#[derive(FromPyObject)]
+enum Which {
+    Number(usize),
+    Name(String),
+}
 
 #[pymethods]
 impl RigidBody {
     /// Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
     ///
-    /// shape: index of the part of a ``Compound``, as ``shapes`` of contacts has it.
-    fn shape_material<'py>(&self, py: Python<'py>, shape: usize) -> Result<Bound<'py, PyDict>> {
-        let m = self.constant(|body| body.shape_material(shape))?;
-        let constants = PyDict::new(py);
-        let numbers = [
-            ("friction", m.friction),
-            ("restitution", m.restitution),
-            ("static_friction", m.static_friction),
-            ("stribeck_speed", m.stribeck_speed),
-            ("rolling_friction", m.rolling_friction),
-            ("torsional_friction", m.torsional_friction),
-            ("tangential_restitution", m.tangential_restitution),
-            ("adhesion", m.adhesion),
-        ];
-        numbers.iter().try_for_each(|(name, value)| constants.set_item(name, value))?;
-        constants.set_item("friction_scale", array(py, m.friction_scale.as_slice()))?;
-        constants.set_item("surface_velocity", array(py, m.surface_velocity.as_slice()))?;
-        Ok(constants)
+    /// shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
+    fn shape_material<'py>(&self, py: Python<'py>, shape: Which) -> Result<Bound<'py, PyDict>> {
+        let shape = self.numbered(shape)?;
+        as_dict(py, &self.constant(|body| body.shape_material(shape))?)
     }
 
     /// Sets surface constants of one shape, the part of a ``Compound``, by the names of the properties of the body.
     ///
-    /// shape: index of the part. Constants that are not given stay as they are, for a shape without its own those of
+    /// shape: name or index of the part. Constants that are not given stay as they are, for a shape without its own those of
     /// the body at this time. Without any, the shape has those of the body again.
     #[pyo3(signature = (shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None,
         torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
@@ -40,7 +95,7 @@ impl RigidBody {
     fn set_shape_material(
         &self,
         py: Python<'_>,
-        shape: usize,
+        shape: Which,
         friction: Option<f64>,
         restitution: Option<f64>,
         static_friction: Option<f64>,
@@ -52,28 +107,97 @@ impl RigidBody {
         adhesion: Option<f64>,
         surface_velocity: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
-        let scale = friction_scale.map(|value| some::<3>(value, "friction_scale")).transpose()?;
-        let velocity = surface_velocity.map(|value| some::<3>(value, "surface_velocity")).transpose()?;
-        self.change(py, |body| {
-            let mut m = body.shape_material(shape);
-            let numbers = [
-                (&mut m.friction, friction),
-                (&mut m.restitution, restitution),
-                (&mut m.static_friction, static_friction),
-                (&mut m.stribeck_speed, stribeck_speed),
-                (&mut m.rolling_friction, rolling_friction),
-                (&mut m.torsional_friction, torsional_friction),
-                (&mut m.tangential_restitution, tangential_restitution),
-                (&mut m.adhesion, adhesion),
-            ];
-            let mut given = scale.is_some() || velocity.is_some();
-            for (to, value) in numbers {
-                given |= value.is_some();
-                value.iter().for_each(|value| *to = *value);
-            }
-            scale.iter().for_each(|scale| m.friction_scale = (*scale).into());
-            velocity.iter().for_each(|velocity| m.surface_velocity = (*velocity).into());
-            body.set_shape_material(shape, given.then_some(m));
+        let numbers = [
+            friction,
+            restitution,
+            static_friction,
+            stribeck_speed,
+            rolling_friction,
+            torsional_friction,
+            tangential_restitution,
+            adhesion,
+        ];
+        let (given, shape) = (Given::new(numbers, friction_scale, surface_velocity)?, self.numbered(shape)?);
+        self.change(py, |body| body.set_shape_material(shape, given.over(body.shape_material(shape))))
+    }
+}
+
+impl RigidBody {
+    fn numbered(&self, shape: Which) -> Result<usize> {
+        match shape {
+            Which::Number(number) => Ok(number),
+            Which::Name(name) => self.shape_number(&name),
+        }
+    }
+}
+
+#[pymethods]
+impl Articulation {
+    /// Returns the surface constants of one shape of a link: a dict by the names of ``set_shape_material``.
+    ///
+    /// shape: name, or number as ``shapes`` of contacts has it.
+    fn shape_material<'py>(&self, py: Python<'py>, link: &str, shape: Which) -> Result<Bound<'py, PyDict>> {
+        let (part, shape) = self.of_link(link, shape)?;
+        let found = self.of_body(|body| body.shape_material(part, shape))?;
+        as_dict(py, &found.unwrap_or_default())
+    }
+
+    /// Sets surface constants of one shape of a link of a body in a world, by the names of ``RigidBody.set_shape_material``.
+    ///
+    /// shape: name, or number as ``shapes`` of contacts has it. Constants that are not given stay as they are. Without any,
+    /// a part of a ``Compound`` has those of the compound again.
+    #[pyo3(signature = (link, shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None,
+        rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn set_shape_material(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        shape: Which,
+        friction: Option<f64>,
+        restitution: Option<f64>,
+        static_friction: Option<f64>,
+        stribeck_speed: Option<f64>,
+        friction_scale: Option<&Bound<'_, PyAny>>,
+        rolling_friction: Option<f64>,
+        torsional_friction: Option<f64>,
+        tangential_restitution: Option<f64>,
+        adhesion: Option<f64>,
+        surface_velocity: Option<&Bound<'_, PyAny>>,
+    ) -> Result<()> {
+        let numbers = [
+            friction,
+            restitution,
+            static_friction,
+            stribeck_speed,
+            rolling_friction,
+            torsional_friction,
+            tangential_restitution,
+            adhesion,
+        ];
+        let place = self.in_world()?;
+        let (given, (part, shape)) =
+            (Given::new(numbers, friction_scale, surface_velocity)?, self.of_link(link, shape)?);
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let material = body.shape_material(part, shape).and_then(|own| given.over(own));
+            Ok(body.set_shape_material(part, shape, material)?)
         })
+    }
+}
+
+impl Articulation {
+    /// Returns the part and the index there of a shape of a link.
+    fn of_link(&self, link: &str, shape: Which) -> Result<(usize, usize)> {
+        let number = match shape {
+            Which::Number(number) => number,
+            Which::Name(name) => self.shape_number(link, &name)?,
+        };
+        let carrier = self.robot.frame(link)?.link;
+        let (found, count) = self.of_body(|body| {
+            let of_link = || body.shapes_of(carrier).map(|(part, shape, _)| (part, shape));
+            (of_link().nth(number), of_link().count())
+        })?;
+        found.ok_or_else(|| Error::value(format!("link '{link}' has no shape {number}; it has {count} that collide")))
     }
 }

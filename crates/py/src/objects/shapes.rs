@@ -23,19 +23,21 @@ pub struct Shape {
     pub solid: Solid,
     /// Pose of that frame in the body's frame, which the user places.
     pub placement: Pose,
+    /// Its name, if it has one.
+    pub name: Option<String>,
     /// Its Python expression.
     pub(super) words: String,
 }
 
 impl Shape {
     pub(super) fn new(solid: Solid, words: String) -> Shape {
-        Shape { solid, placement: Pose::identity(), words }
+        Shape { solid, placement: Pose::identity(), name: None, words }
     }
 
     /// Returns the shape of a record, as an object of its class.
     pub fn of_record(py: Python<'_>, record: ShapeRecord) -> Result<Py<PyAny>> {
-        let ShapeRecord { solid, placement, words } = record;
-        let shape = Shape { solid, placement, words };
+        let ShapeRecord { solid, placement, name, words } = record;
+        let shape = Shape { solid, placement, name, words };
         Ok(match &shape.solid {
             Solid::Sphere { .. } => Py::new(py, shape.into_a(Sphere))?.into_any(),
             Solid::Box { .. } | Solid::RoundedBox { .. } => Py::new(py, shape.into_a(Block))?.into_any(),
@@ -47,6 +49,11 @@ impl Shape {
             Solid::Mesh(_) => mesh_of_record(py, shape)?,
             Solid::Compound(_) => Py::new(py, shape.into_a(Compound))?.into_any(),
         })
+    }
+
+    fn record(&self) -> ShapeRecord {
+        let (solid, name, words) = (self.solid.clone(), self.name.clone(), self.words.clone());
+        ShapeRecord { solid, placement: self.placement, name, words }
     }
 
     /// Returns the shape as an object of one of its classes.
@@ -70,10 +77,27 @@ impl Shape {
         self.solid.bounding_radius()
     }
 
+    /// The name that ``named`` gave it, or None.
+    #[getter]
+    fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
+    /// Returns the same shape with a name, by which contacts, hits and events report it.
+    ///
+    /// The shapes of one body, or of one link, must have different names. A ``Compound`` has no name: its parts have.
+    fn named(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
+        if name.is_empty() || matches!(self.solid, Solid::Compound(_)) {
+            let expected = "expected a name that is not empty, of a shape that is no Compound, whose parts have names";
+            return Err(Error::value(format!("named('{name}') of {}: {expected}", self.words)));
+        }
+        Shape::of_record(py, ShapeRecord { name: Some(name.into()), ..self.record() })
+    }
+
     /// Pickles the shape.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let (py, own) = (slf.py(), slf.get());
-        let record = ShapeRecord { solid: own.solid.clone(), placement: own.placement, words: own.words.clone() };
+        let record = own.record();
         let unpickle = py.import("tumble._native")?.getattr("_unpickle_shape")?;
         Ok((unpickle, (PyBytes::new(py, &write_shape(&record)?),)))
     }
@@ -216,7 +240,7 @@ impl HalfSpace {
             .unwrap_or_else(|| Quat::from_quaternion(nalgebra::Quaternion::new(0.0, 1.0, 0.0, 0.0)));
         let placement = Pose::from_parts(Translation3::from(n * offset), rotation);
         let words = format!("HalfSpace(normal=({}, {}, {}), offset={offset})", given.x, given.y, given.z);
-        Ok(Shape { solid: Solid::half_space(), placement, words }.into_a(HalfSpace))
+        Ok(Shape { placement, ..Shape::new(Solid::half_space(), words) }.into_a(HalfSpace))
     }
 }
 
@@ -295,7 +319,7 @@ pub(super) fn built(py: Python<'_>, name: &str, mesh: TriMesh) -> Result<Solid> 
 ///
 /// parts: tuples ``(shape, position)``, ``(shape, position, orientation)`` or ``(shape, position,
 /// orientation, density)``: position of the shape's origin, meters; orientation: quaternion
-/// (x, y, z, w) or None; density: kg/m³, for all parts or for none. A body made without mass and
+/// (x, y, z, w) or None; density: kg/m³, for all parts or for none. A part has the name of its shape: ``shape.named``. A body made without mass and
 /// density has these densities. Parts may overlap; mass and volume of an overlap then count for
 /// each. The frame of its body is that of the positions.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
@@ -335,7 +359,7 @@ fn compound_part(n: usize, part: &Bound<'_, PyAny>) -> Result<CompoundPart> {
     let density =
         given(1).map(|density| number(density.extract::<f64>().map_err(|_| wrong())?, "density")).transpose()?;
     let pose = Pose::from_parts(vec3(position, "position")?.into(), turn);
-    Ok(CompoundPart { shape: shape.solid.clone(), pose, density })
+    Ok(CompoundPart { shape: shape.solid.clone(), pose, density, name: shape.name.clone() })
 }
 
 /// Returns triangles from arrays, from an object that has them (trimesh), or from a file.

@@ -48,9 +48,14 @@ pub fn named_shape<'py>(
     Ok((name, shape.extract()?))
 }
 
+/// Returns a fixed body of a shape, with the name of the shape.
+pub fn solid(shape: &Shape) -> Rigid {
+    shape.name.iter().fold(Rigid::fixed(shape.solid.clone()), Rigid::with_shape_name)
+}
+
 /// Returns a body with a mass or a density; without both it has the densities of the parts of a compound, the default density, or no mass if it is kinematic.
 pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>, kinematic: bool) -> Result<Rigid> {
-    let body = Rigid::fixed(shape.solid.clone()).with_name(name);
+    let body = solid(shape).with_name(name);
     match (mass, density) {
         (Some(mass), None) => Ok(body.with_mass(mass)),
         (None, density) if !kinematic => {

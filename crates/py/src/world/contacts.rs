@@ -3,7 +3,7 @@
 use crate::arrays::convert::vector;
 use crate::behaviors;
 use crate::choices::word;
-use crate::errors::Result;
+use crate::errors::{Error, Result};
 use crate::objects::bodies::handle;
 use crate::objects::place::{Found, body_ids, found};
 use crate::world::inner::Inner;
@@ -13,8 +13,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyList;
 use std::sync::Arc;
-use tumble::collide::Shape as Solid;
-use tumble::dynamics::{ArticulatedBody, Collidable, Event, EventKind, ObjectId};
+use tumble::dynamics::{ArticulatedBody, Event, EventKind, ObjectId};
 
 /// Fields of a contact: name, format, count. All have 8 bytes, so there is no padding.
 const FIELDS: [(&str, &str, usize); 9] = [
@@ -62,12 +61,29 @@ pub fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
 /// Returns the number of a shape: the index of a compound's part; on a link, its index among the
 /// shapes of the link that collide, where the parts of a compound count one by one.
 pub fn shape_number(inner: &Inner, id: ObjectId, part: usize, shape: usize) -> i64 {
-    let before = inner.world.get::<ArticulatedBody>(id).map_or(0, |body| {
-        let count = |solid: &Solid| if let Solid::Compound(compound) = solid { compound.parts().len() } else { 1 };
-        let earlier = body.colliders_of(body.link_of(part)).filter(|other| *other < part);
-        earlier.filter_map(|other| Collidable::shape(body, other)).map(count).sum()
-    });
-    (before + shape) as i64
+    inner.world.get::<ArticulatedBody>(id).map_or(shape, |body| body.shape_number(part, shape)) as i64
+}
+
+/// Returns the name of a shape by its body, and the index of its link and its number as contacts report them.
+pub fn shape_name(inner: &Inner, id: ObjectId, link: usize, number: usize) -> Result<Option<String>> {
+    let none = |owner: &str, count: usize| {
+        Error::value(format!("{owner} has no shape {number}; it has {count} that collide, numbered from 0"))
+    };
+    let Some(body) = inner.world.get::<ArticulatedBody>(id) else {
+        let solid = inner.world.object(id).and_then(|object| object.collidable()?.shape(0));
+        let count = solid.map_or(0, |solid| solid.part_count());
+        return match link == 0 && number < count {
+            true => Ok(inner.world.shape_name(id, 0, number).map(str::to_owned)),
+            false => Err(none(inner.world.name(id).unwrap_or_default(), count)),
+        };
+    };
+    let frames = body.model().frames();
+    let frame = frames.get(link).ok_or_else(|| {
+        Error::value(format!("part is {link}; it must be an index of the {} links in link_names", frames.len()))
+    })?;
+    let found = body.shapes_of(frame.link).nth(number);
+    let (_, _, name) = found.ok_or_else(|| none(&frame.name, body.shapes_of(frame.link).count()))?;
+    Ok(name.map(str::to_owned))
 }
 
 /// Returns the array of such bytes.
@@ -89,23 +105,43 @@ pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
     Ok(kind.bind(py).clone())
 }
 
+/// One side of an event.
+#[derive(Default)]
+struct Side {
+    link: i64,
+    shape: i64,
+    name: Option<String>,
+}
+
+/// Returns whether an event knows the shapes that touch.
+fn touches(kind: EventKind) -> bool {
+    matches!(kind, EventKind::ContactBegin | EventKind::ContactPersist)
+}
+
 /// Returns the events of the last step.
 pub fn events(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
     let all = shared.read(|inner| {
         let found = |e: &Event| {
             let a = found(inner, e.a)?;
             let b = e.b.and_then(|id| found(inner, id));
-            let part_b = e.b.map_or(0, |id| link(inner, id, e.part_b));
-            Some((*e, a, b, (link(inner, e.a, e.part_a), part_b)))
+            let side = |id, part, shape| Side {
+                link: link(inner, id, part),
+                shape: shape_number(inner, id, part, shape),
+                name: inner.world.shape_name(id, part, shape).filter(|_| touches(e.kind)).map(str::to_owned),
+            };
+            let b_side = e.b.map_or_else(Side::default, |id| side(id, e.part_b, e.shape_b));
+            Some((*e, a, b, [side(e.a, e.part_a, e.shape_a), b_side]))
         };
         Ok(inner.world.events().iter().filter_map(found).collect::<Vec<_>>())
     })?;
     let class = py.import("tumble._values")?.getattr("Event")?;
-    let tuple = |(event, a, b, parts): (Event, _, Option<_>, (i64, i64))| {
+    let tuple = |(event, a, b, [first, second]): (Event, _, Option<_>, [Side; 2])| {
         let a = event_side(py, shared, a)?;
         let b = b.map(|b| handle(py, shared, b)).transpose()?;
         let kind = word(event.kind, EventKind::NAMES);
-        Ok(class.call1((kind, a, b, parts, vector(py, &event.impulse), vector(py, &event.point)))?.unbind())
+        let (parts, shapes) = ((first.link, second.link), (first.shape, second.shape));
+        let (impulse, point) = (vector(py, &event.impulse), vector(py, &event.point));
+        Ok(class.call1((kind, a, b, parts, impulse, point, shapes, (first.name, second.name)))?.unbind())
     };
     all.into_iter().map(tuple).collect()
 }

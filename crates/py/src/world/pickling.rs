@@ -19,7 +19,7 @@ use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, Sky
 
 /// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
 const WORLD: &[u8; 8] = b"tumbleW4";
-const SHAPE: &[u8; 8] = b"tumbleG2";
+const SHAPE: &[u8; 8] = b"tumbleG3";
 
 /// A world.
 #[derive(Serialize, Deserialize)]
@@ -140,6 +140,7 @@ pub fn read_body(bytes: &[u8]) -> Result<ArticulatedBody> {
 pub struct ShapeRecord {
     pub solid: Solid,
     pub placement: Pose,
+    pub name: Option<String>,
     pub words: String,
 }
 

@@ -4,13 +4,13 @@ use tumble_core::articulated::{
     ArticulatedBody, ArticulatedError, Collider, Coupling, DofSettings, Kinematics, LinkMass, Model, ModelBuilder,
     ModelError,
 };
-use tumble_core::collide::{Pose, Shape, contacts};
+use tumble_core::collide::{Pose, Shape, Vec3, contacts};
 use tumble_core::{Appearance, CameraMount, Joint, Material, Object, Visual};
 
 use crate::build::appearance::{appearance, material_id};
-use crate::build::shapes::{Placed, Purpose, ShapeMaker, mass};
+use crate::build::shapes::{Placed, Purpose, ShapeMaker, mass, own_materials};
 use crate::parse::articulated::ArticulatedSpec;
-use crate::parse::link::LinkSpec;
+use crate::parse::link::{Geometry, LinkSpec};
 
 /// Pairs of links that a note lists by name.
 const MAX_LISTED_PAIRS: usize = 8;
@@ -119,16 +119,18 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
     let surface = &placed.spec.surface;
     if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
         let material = Material { id: material_id(surface.material), ..surface.contact };
-        body.add_collider(
-            link,
-            Collider {
-                material,
-                contact_mode: surface.contacts,
-                group: surface.group,
-                mask: surface.mask,
-                ..Collider::new(shape.clone(), placed.spec.pose)
-            },
-        )?;
+        let mut collider = Collider {
+            contact_mode: surface.contacts,
+            group: surface.group,
+            mask: surface.mask,
+            name: placed.spec.name.clone(),
+            one_way: placed.spec.one_way.map(Vec3::from),
+            ..Collider::new(shape.clone(), placed.spec.pose).with_material(material)
+        };
+        if let Geometry::Shape(spec) = &placed.spec.geometry {
+            collider = own_materials(spec).fold(collider, |made, (n, own)| made.with_shape_material(n, own));
+        }
+        body.add_collider(link, collider)?;
     }
     if placed.visible {
         let appearance: Appearance = appearance(&surface.appearance, &placed.center());

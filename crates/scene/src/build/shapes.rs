@@ -12,15 +12,16 @@ use std::sync::Arc;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{CompoundPart, Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
-use tumble_core::{VisualGeometry, VisualMesh};
+use tumble_core::{Material, VisualGeometry, VisualMesh};
 
+use crate::build::appearance::material_id;
 use crate::build::mesh_files::{read_file, stretched};
 use crate::build::slow::building_surface;
 use crate::build::visual_mesh;
 use crate::notes::NoteList;
 use crate::parse::body::MassSpec;
 use crate::parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
-use crate::parse::shape::{CompoundPartSpec, ShapeSpec};
+use crate::parse::shape::{CompoundPartSpec, PartSurface, ShapeSpec};
 
 /// A shape or visual with its pose on a link.
 #[derive(Clone)]
@@ -95,7 +96,12 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeErr
     match *spec {
         ShapeSpec::Compound { ref parts } => {
             let part = |part: &CompoundPartSpec| {
-                Ok(CompoundPart { shape: make(&part.shape, meshes)?, pose: part.pose, density: part.density_kg_per_m3 })
+                Ok(CompoundPart {
+                    shape: make(&part.shape, meshes)?,
+                    pose: part.pose,
+                    density: part.density_kg_per_m3,
+                    name: part.name.clone(),
+                })
             };
             Shape::compound(parts.iter().map(part).collect::<Result<_, ShapeError>>()?)
         }
@@ -112,6 +118,14 @@ pub(crate) fn make(spec: &ShapeSpec, meshes: &[Shape]) -> Result<Shape, ShapeErr
             Shape::rounded_cylinder(radius_m, length_m, rounding_m)
         }
     }
+}
+
+/// Returns the surface constants of those parts of a compound that have their own, with their numbers.
+pub(crate) fn own_materials(spec: &ShapeSpec) -> impl Iterator<Item = (usize, Material)> {
+    let own = |(n, own): (usize, Option<PartSurface>)| {
+        own.map(|own| (n, Material { id: material_id(own.material), ..own.contact }))
+    };
+    spec.surfaces().into_iter().enumerate().filter_map(own)
 }
 
 fn center(geometry: &VisualGeometry) -> Vec3 {

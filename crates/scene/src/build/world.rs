@@ -228,10 +228,8 @@ impl SceneFile {
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let pose = Pose::from_parts(Translation3::from(Vec3::from(spec.position_m)), rotation);
         let material = Material { id: material_id(spec.material), ..spec.contact };
-        let of_parts = spec.shape.surfaces().into_iter().enumerate().filter_map(|(n, own)| Some((n, own?)));
-        let body = of_parts.fold(body, |body, (n, own)| {
-            body.with_shape_material(n, Material { id: material_id(own.material), ..own.contact })
-        });
+        let body = shapes::own_materials(&spec.shape).fold(body, |body, (n, own)| body.with_shape_material(n, own));
+        let body = spec.shape_name.iter().fold(body, |body, name| body.with_shape_name(name));
         let mut body = body
             .with_name(&spec.name)
             .with_pose(pose)

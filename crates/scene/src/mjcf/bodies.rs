@@ -59,7 +59,8 @@ impl Assembly<'_, '_> {
             let name = geom.name.clone().unwrap_or_else(|| format!("{owner}/geom{k}"));
             let (name, shape) = (self.taken.unique(name), self.meshes.shape(made));
             let spec = self.body_spec(name, Mode::Static, shape, &(pose * geom.pose), geom);
-            let spec = BodySpec { collides, visible: geom.visible, ..spec };
+            let shape_name = geom.name.clone();
+            let spec = BodySpec { collides, visible: geom.visible, shape_name, ..spec };
             self.statics[body].push((k, self.scene.bodies.len()));
             let spec = self.with_ground(spec, geom, &(pose * geom.pose));
             self.scene.bodies.push(spec);
@@ -88,12 +89,12 @@ impl Assembly<'_, '_> {
         }
         let Some((first, _)) = parts.first() else { return };
         let first = *first;
-        let shape = joined(parts.iter().map(|(geom, shape)| (geom.pose, shape.clone())).collect());
+        let (shape, shape_name) = joined(parts.iter().map(|(geom, shape)| (*geom, shape.clone())).collect());
         let name = self.taken.unique(self.name_of(body));
         let spec = self.body_spec(name, Mode::Kinematic, shape, &self.poses[body], first);
         let collides = self.groups.collides(first);
         self.statics[body] = (0..self.bodies[body].geoms.len()).map(|k| (k, self.scene.bodies.len())).collect();
-        self.scene.bodies.push(BodySpec { collides, ..spec });
+        self.scene.bodies.push(BodySpec { collides, shape_name, ..spec });
     }
 
     /// Adds a free body as a rigid body. Returns whether that can express it.
@@ -115,16 +116,18 @@ impl Assembly<'_, '_> {
         let mut parts = Vec::new();
         for geom in &own.geoms {
             let Some(made) = make(geom, self.reader) else { return false };
-            parts.push((geom.pose, self.meshes.shape(made)));
+            parts.push((geom, self.meshes.shape(made)));
         }
         let name = self.taken.unique(self.name_of(body));
-        let spec = self.body_spec(name, Mode::Dynamic, joined(parts), &self.poses[body], &own.geoms[0]);
+        let (shape, shape_name) = joined(parts);
+        let spec = self.body_spec(name, Mode::Dynamic, shape, &self.poses[body], &own.geoms[0]);
         self.places[body] = Place::Rigid(self.scene.bodies.len());
         self.scene.bodies.push(BodySpec {
             mass: Some(MassSpec::Mass(mass.mass)),
             center_m: Some(mass.center.into()),
             inertia_kg_m2: Some(mass.inertia),
             gravity_scale: own.gravity_scale,
+            shape_name,
             ..spec
         });
         true
@@ -137,6 +140,7 @@ impl Assembly<'_, '_> {
             name,
             mode,
             shape,
+            shape_name: None,
             mass: None,
             position_m: pose.translation.vector.into(),
             orientation_xyzw: [q.x, q.y, q.z, q.w],
@@ -279,11 +283,18 @@ fn add_frame(links: &mut Vec<LinkSpec>, taken: &mut Taken, carrier: usize, label
     links.push(LinkSpec { mounts, ..link_spec(name, Some(carrier), pose, joint, LinkMass::none()) });
 }
 
-/// Returns one shape of several in the same frame.
-fn joined(mut parts: Vec<(Pose, ShapeSpec)>) -> ShapeSpec {
-    if parts.len() == 1 && parts[0].0 == Pose::identity() {
-        return parts.remove(0).1;
+/// Returns one shape of several in the same frame, and its name, unless it is a compound, whose parts have names.
+fn joined(mut parts: Vec<(&Geom<'_>, ShapeSpec)>) -> (ShapeSpec, Option<String>) {
+    if parts.len() == 1 && parts[0].0.pose == Pose::identity() {
+        let (geom, shape) = parts.remove(0);
+        return (shape, geom.name.clone());
     }
-    let part = |(pose, shape)| CompoundPartSpec { shape, pose, density_kg_per_m3: None, surface: None };
-    ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }
+    let part = |(geom, shape): (&Geom<'_>, ShapeSpec)| CompoundPartSpec {
+        shape,
+        pose: geom.pose,
+        density_kg_per_m3: None,
+        surface: None,
+        name: geom.name.clone(),
+    };
+    (ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }, None)
 }

@@ -27,16 +27,19 @@ impl Names {
         names.bodies.insert("world".into(), 0);
         for (number, body) in bodies.iter().enumerate() {
             if let Some(name) = &body.name {
-                note(&mut names.bodies, name, number, &body.element);
+                note(&mut names.bodies, name, number, &body.element, |at| &bodies[at].element);
             }
             for (k, geom) in body.geoms.iter().enumerate() {
-                geom.name.iter().for_each(|name| note(&mut names.geoms, name, (number, k), &geom.element));
+                let first = |(number, k): (usize, usize)| &bodies[number].geoms[k].element;
+                geom.name.iter().for_each(|name| note(&mut names.geoms, name, (number, k), &geom.element, first));
             }
             for (k, joint) in body.joints.iter().enumerate() {
-                joint.name.iter().for_each(|name| note(&mut names.joints, name, (number, k), &joint.element));
+                let first = |(number, k): (usize, usize)| &bodies[number].joints[k].element;
+                joint.name.iter().for_each(|name| note(&mut names.joints, name, (number, k), &joint.element, first));
             }
             for (k, site) in body.sites.iter().enumerate() {
-                site.name.iter().for_each(|name| note(&mut names.sites, name, (number, k), &site.element));
+                let first = |(number, k): (usize, usize)| &bodies[number].sites[k].element;
+                site.name.iter().for_each(|name| note(&mut names.sites, name, (number, k), &site.element, first));
             }
         }
         names
@@ -59,9 +62,17 @@ pub(super) fn joint_ends(root: &XmlNode<'_>) -> BTreeSet<String> {
     &ends - &others
 }
 
-fn note<T>(names: &mut BTreeMap<String, T>, name: &str, at: T, element: &Element<'_, '_>) {
-    if names.contains_key(name) {
-        return element.problem("has a name that is used before", "expected a unique name");
+/// Adds a name. `element_of` returns the element of an earlier one.
+fn note<'b, 'x: 'b, T: Copy>(
+    names: &mut BTreeMap<String, T>,
+    name: &str,
+    at: T,
+    element: &Element<'_, '_>,
+    element_of: impl Fn(T) -> &'b Element<'x, 'x>,
+) {
+    if let Some(first) = names.get(name) {
+        let message = format!("has a name that is used before, at {}", element_of(*first).place());
+        return element.problem(message, "expected a unique name");
     }
     names.insert(name.to_owned(), at);
 }

@@ -152,6 +152,8 @@ pub(super) fn on_link(geom: &Geom<'_>, groups: &Groups, reader: &Reader<'_>) -> 
         surface: surface.clone(),
         collides,
         visible,
+        name: geom.name.clone().filter(|_| collides),
+        one_way: None,
     };
     let mut shapes = Vec::new();
     let mut visible = geom.visible;

@@ -39,6 +39,8 @@ pub struct BodySpec {
     pub mode: Mode,
     /// The shape in body axes.
     pub shape: ShapeSpec,
+    /// Name of the shape; none for a compound, whose parts have names.
+    pub shape_name: Option<String>,
     /// Present for every dynamic body, except compounds whose parts have densities.
     pub mass: Option<MassSpec>,
     /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
@@ -111,7 +113,7 @@ impl BodySpec {
         let contact = read_contact(f, &base.map_or_else(Material::default, |m| m.contact));
         let surface = PartSurface { material, contact };
         let context = ShapeContext { meshes: &library.meshes, surface: Some((library, surface)) };
-        let shape = ShapeSpec::read(f, context);
+        let (shape, shape_name) = ShapeSpec::read(f, context).map_or((None, None), |(shape, name)| (Some(shape), name));
         let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
@@ -119,6 +121,7 @@ impl BodySpec {
             name: name.unwrap_or_default(),
             mode,
             shape: shape.clone().unwrap_or(ShapeSpec::HalfSpace),
+            shape_name,
             mass,
             position_m: f.vector_or("position_m", Bound::ANY, [0.0; 3]),
             orientation_xyzw: rotation::read(f),
@@ -186,7 +189,7 @@ pub(crate) fn read_mask(f: &mut Fields<'_>, default: u64) -> u64 {
 }
 
 /// Reads a direction of any length above 0.
-fn read_direction(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 3]> {
+pub(crate) fn read_direction(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 3]> {
     let direction = f.optional_vector(key, Bound::ANY)?;
     if direction == [0.0; 3]
         && let Some(value) = f.value(key)

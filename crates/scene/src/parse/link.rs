@@ -9,7 +9,7 @@ use tumble_core::collide::{ContactMode, Mat3, Pose, TriMesh, Vec3};
 use tumble_core::{CollisionGroup, Joint, Material};
 
 use crate::parse::appearance::{AppearanceSpec, Color, as_color};
-use crate::parse::body::{Library, MassSpec, read_group, read_mask, read_material, read_name};
+use crate::parse::body::{Library, MassSpec, read_direction, read_group, read_mask, read_material, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::JointSpec;
@@ -17,7 +17,7 @@ use crate::parse::material::read_contact;
 use crate::parse::mesh::read_path;
 use crate::parse::mount::Mounts;
 use crate::parse::rotation;
-use crate::parse::shape::{ShapeContext, ShapeSpec};
+use crate::parse::shape::{PartSurface, ShapeContext, ShapeNames, ShapeSpec, read_shape_name};
 use crate::parse::world::CONTACTS;
 
 /// Largest number of shapes of one link.
@@ -87,6 +87,10 @@ pub struct LinkShape {
     pub collides: bool,
     /// Is drawn.
     pub visible: bool,
+    /// Name, unlike those of all other shapes of the link; none for a compound, whose parts have names.
+    pub name: Option<String>,
+    /// Direction, of any length above 0, in the shape's own axes, of a shape that collides on one side only.
+    pub one_way: Option<[f64; 3]>,
 }
 
 /// The geometry of a shape on a link.
@@ -270,15 +274,20 @@ fn read_shapes(f: &mut Fields<'_>, from: &Inherited<'_, '_>) -> Vec<LinkShape> {
     let all = single.into_iter().map(|value| (value, format!("the shape of {what}")));
     let all =
         all.chain(several.into_iter().enumerate().map(|(n, value)| (value, format!("shape {} of {what}", n + 1))));
-    all.filter_map(|(value, what)| LinkShape::read(Fields::of(f.log, value, what, example)?, from)).collect()
+    let mut names = ShapeNames::default();
+    all.filter_map(|(value, what)| LinkShape::read(Fields::of(f.log, value, what, example)?, from, &mut names))
+        .collect()
 }
 
 impl LinkShape {
-    fn read(mut f: Fields<'_>, from: &Inherited<'_, '_>) -> Option<LinkShape> {
+    fn read(mut f: Fields<'_>, from: &Inherited<'_, '_>, names: &mut ShapeNames) -> Option<LinkShape> {
         if f.value("type").and_then(|value| value.get_ref().as_str()) == Some("visual_mesh") {
             return LinkShape::read_visual(f, from);
         }
-        let Some(shape) = ShapeSpec::read_part(&mut f, ShapeContext::of_meshes(&from.library.meshes)) else {
+        let surface = Surface::read(&mut f, from.library, from.surface);
+        let of_parts = PartSurface { material: surface.material, contact: surface.contact };
+        let context = ShapeContext { meshes: &from.library.meshes, surface: Some((from.library, of_parts)) };
+        let Some(shape) = ShapeSpec::read_part(&mut f, context) else {
             f.give_up();
             return None;
         };
@@ -290,6 +299,8 @@ impl LinkShape {
                 "expected a shape of finite size; make the half-space a static [[body]]",
             );
         }
+        let name = read_shape_name(&mut f, shape.is_compound());
+        names.check(&f, name.as_deref(), &shape);
         let mass = f.optional_number("mass_kg", Bound::POSITIVE).map(MassSpec::Mass);
         let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE).map(MassSpec::Density);
         if mass.is_some() && density.is_some() {
@@ -300,9 +311,11 @@ impl LinkShape {
             pose: rotation::read_pose(&mut f),
             geometry: Geometry::Shape(shape),
             mass: mass.or(density),
-            surface: Surface::read(&mut f, from.library, from.surface),
+            surface,
             collides: f.flag_or("collides", from.collides),
             visible: f.flag_or("visible", from.visible),
+            name,
+            one_way: read_direction(&mut f, "one_way"),
         };
         f.finish();
         Some(read)
@@ -320,7 +333,7 @@ impl LinkShape {
         let place = f.what.clone();
         f.finish();
         let geometry = Geometry::File { path: path?, scale: [scale; 3], place, hull: false, required: true };
-        Some(LinkShape { pose, geometry, mass: None, surface, collides: false, visible })
+        Some(LinkShape { pose, geometry, mass: None, surface, collides: false, visible, name: None, one_way: None })
     }
 }
 

@@ -94,6 +94,18 @@ pub struct CompoundPartSpec {
     pub density_kg_per_m3: Option<f64>,
     /// Surface constants of its own. Default: those of the body.
     pub surface: Option<PartSurface>,
+    /// Name, unlike those of all other shapes of the body or link; none for a compound.
+    pub name: Option<String>,
+}
+
+impl CompoundPartSpec {
+    /// Returns its name, or those of its parts.
+    fn names(&self) -> Vec<Option<&str>> {
+        match &self.shape {
+            inner @ ShapeSpec::Compound { .. } => inner.names(),
+            _ => vec![self.name.as_deref()],
+        }
+    }
 }
 
 /// Surface constants of a part of a compound.
@@ -147,8 +159,8 @@ const KINDS: Names<Kind> = &[
 ];
 
 impl ShapeSpec {
-    /// Reads the key `shape` of a body.
-    pub(crate) fn read(body: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeSpec> {
+    /// Reads the key `shape` of a body, with the name of the shape.
+    pub(crate) fn read(body: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<(ShapeSpec, Option<String>)> {
         let example = "{ type = \"sphere\", radius_m = 0.5 }";
         let value = body.required("shape", &format!("a shape, such as {example}"))?;
         let mut f = Fields::of(body.log, value, format!("the shape of {}", body.what), example)?;
@@ -156,9 +168,10 @@ impl ShapeSpec {
             f.give_up();
             return None;
         };
+        let name = read_shape_name(&mut f, matches!(kind, Kind::Compound));
         let shape = ShapeSpec::of_kind(&mut f, kind, context);
         f.finish();
-        shape
+        shape.map(|shape| (shape, name))
     }
 
     /// Reads a shape from a table that has other keys as well. Does not finish the table.
@@ -208,6 +221,11 @@ impl ShapeSpec {
         }
     }
 
+    /// Returns whether it is a compound.
+    pub(crate) fn is_compound(&self) -> bool {
+        matches!(self, ShapeSpec::Compound { .. })
+    }
+
     /// Returns whether the shape has densities of its own.
     pub(crate) fn has_density(&self) -> bool {
         let has = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
@@ -223,6 +241,12 @@ impl ShapeSpec {
             part.shape.surfaces().into_iter().map(move |inner| inner.or(own))
         };
         parts.iter().flat_map(of_part).collect()
+    }
+
+    /// Returns the names of its parts, one by one like [`surfaces`](Self::surfaces).
+    fn names(&self) -> Vec<Option<&str>> {
+        let ShapeSpec::Compound { parts } = self else { return vec![None] };
+        parts.iter().flat_map(CompoundPartSpec::names).collect()
     }
 
     /// Adds `by` to the indices of its meshes.
@@ -266,7 +290,7 @@ fn read_compound(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeS
     }
     let (what, count) = (f.what.clone(), values.len());
     let named = |n: usize| format!("part {} of {what}", n + 1);
-    let mut parts = Vec::with_capacity(count);
+    let (mut parts, mut names) = (Vec::with_capacity(count), ShapeNames::default());
     for (n, value) in values.into_iter().enumerate() {
         let Some(mut part) = Fields::of(f.log, value, named(n), example) else { continue };
         let surface = read_surface(&mut part, context);
@@ -280,10 +304,12 @@ fn read_compound(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeS
             let expected = "expected a shape of finite size; make the half-space a static [[body]]";
             part.log.report(part.span.clone(), message, expected);
         }
+        let name = read_shape_name(&mut part, shape.is_compound());
+        names.check(&part, name.as_deref(), &shape);
         let pose = rotation::read_pose(&mut part);
         let density_kg_per_m3 = part.optional_number("density_kg_per_m3", Bound::POSITIVE);
         part.finish();
-        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3, surface });
+        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3, surface, name });
     }
     let own = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
     if let Some(n) = parts.iter().position(|part| own(part) != own(&parts[0])) {
@@ -301,6 +327,36 @@ fn read_surface(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<PartSur
     let base = named.map_or(body.contact, |index| library.materials[index].contact);
     let surface = PartSurface { material: named.or(body.material), contact: read_contact(f, &base) };
     (own || named.is_some()).then_some(surface)
+}
+
+/// Reads the name of a shape.
+pub(crate) fn read_shape_name(f: &mut Fields<'_>, is_compound: bool) -> Option<String> {
+    let (name, value) = f.optional_text("name")?;
+    if name.is_empty() || name.chars().any(char::is_control) {
+        f.wrong("name", value, "a name that is not empty and has no control characters");
+    } else if is_compound {
+        f.wrong("name", value, "no name for a compound, but one for each of its parts");
+    }
+    Some(name.to_owned())
+}
+
+/// The names of the shapes of one body or link, each with the shape that has it.
+#[derive(Default)]
+pub(crate) struct ShapeNames(BTreeMap<String, String>);
+
+impl ShapeNames {
+    /// Reports each name of a shape, or of its parts, that an earlier shape has.
+    pub(crate) fn check(&mut self, f: &Fields<'_>, name: Option<&str>, shape: &ShapeSpec) {
+        for name in name.into_iter().chain(shape.names().into_iter().flatten()) {
+            match self.0.get(name) {
+                Some(first) => {
+                    let message = format!("{} has the name \"{name}\" of {first}", f.what);
+                    f.log.report(f.span.clone(), message, "expected different names of the shapes of a body or link");
+                }
+                None => drop(self.0.insert(name.to_owned(), f.what.clone())),
+            }
+        }
+    }
 }
 
 /// Returns the mesh named by `mesh`; `None` if there is no such mesh or it is itself wrong.

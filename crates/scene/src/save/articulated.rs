@@ -14,7 +14,7 @@ use crate::parse::appearance::AppearanceSpec;
 
 /// Everything fixed to one moving link, or to the base.
 struct Carried<'b> {
-    colliders: Vec<&'b Collider>,
+    colliders: Vec<(usize, &'b Collider)>,
     visuals: Vec<&'b Visual>,
 }
 
@@ -134,7 +134,7 @@ impl Writer<'_> {
             t.put("inertia_kg_m2", inertia(&mass.inertia));
         }
         t.extend(self.mounts(body, k));
-        t.extend(self.shapes(name, &carried(body, Some(k)), &Pose::identity()));
+        t.extend(self.shapes(body, name, &carried(body, Some(k)), &Pose::identity()));
         t
     }
 
@@ -149,7 +149,7 @@ impl Writer<'_> {
         let first = body.model().frames().iter().find(|f| f.link.is_none()).is_some_and(|f| f.name == *name);
         if first {
             t.extend(self.mounts(body, body.model().links().len()));
-            t.extend(self.shapes(name, &carried(body, None), pose));
+            t.extend(self.shapes(body, name, &carried(body, None), pose));
         }
         t
     }
@@ -169,21 +169,24 @@ impl Writer<'_> {
 
     /// Returns the list of shapes: colliders, each with its visual if it has one, then visuals alone.
     /// `frame` is the pose of the link's frame in that of its carrier.
-    fn shapes(&mut self, link: &str, carried: &Carried<'_>, frame: &Pose) -> Table {
+    fn shapes(&mut self, body: &ArticulatedBody, link: &str, carried: &Carried<'_>, frame: &Pose) -> Table {
         let mut left = carried.visuals.clone();
         let mut list = Vec::new();
-        for collider in &carried.colliders {
-            let Collider { pose, shape, material, contact_mode, group, mask } = collider;
+        for (part, collider) in &carried.colliders {
+            // the names and surfaces of shapes are read from the body below
+            let Collider { pose, shape, material, contact_mode, group, mask, name: _, shape_materials: _, one_way } =
+                collider;
             let drawn = left.iter().position(|visual| {
                 matches!(&visual.geometry, VisualGeometry::Shape(s) if is_same(s, shape)) && visual.pose == *pose
             });
             let visual = drawn.map(|k| left.remove(k));
-            let mut t = self.meshes.shape(shape);
+            let mut t = self.solid(shape, body, *part);
             t.put_pose(&(frame.inverse() * pose * about_frame(shape)));
             let (contact, look) = self.surface_of(material, &mut t);
             t.extend(surface::contact(material, &contact));
             t.put_unless(ContactMode::Surface, "contacts", *contact_mode);
             t.extend(surface::groups(*group, *mask));
+            one_way.iter().for_each(|direction| t.put("one_way", *direction));
             match visual {
                 Some(visual) => t.extend(self.visual_look(link, visual, &shape.center_of_mass(), &look)),
                 None => t.put("visible", false),
@@ -235,7 +238,7 @@ fn carried(body: &ArticulatedBody, link: Option<usize>) -> Carried<'_> {
     // a stand-in for meshes that can be read is not drawn
     let drawn = |visual: &&Visual| visual.part == part && visual.drawn().is_some();
     Carried {
-        colliders: body.colliders().filter(|(l, _)| *l == link).map(|(_, collider)| collider).collect(),
+        colliders: body.colliders_of(link).zip(body.colliders().filter(|(l, _)| *l == link).map(|(_, c)| c)).collect(),
         visuals: visuals.iter().filter(drawn).collect(),
     }
 }

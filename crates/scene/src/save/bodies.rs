@@ -1,7 +1,7 @@
 //! `[[body]]` of a rigid body as it stands.
 
-use tumble_core::collide::{ContactMode, Mat3, Pose, Vec3};
-use tumble_core::{Material, Mode, Object, ObjectId, RigidBody, Visual, VisualGeometry};
+use tumble_core::collide::{ContactMode, Mat3, Pose, Shape, Vec3};
+use tumble_core::{Collidable, Material, Mode, Object, ObjectId, RigidBody, Visual, VisualGeometry};
 
 use super::Writer;
 use super::shapes::is_same;
@@ -40,9 +40,7 @@ impl Writer<'_> {
 
     /// Returns the keys that a body and a template have in common: shape, mass, surface, laws and looks.
     pub(super) fn constants(&mut self, name: &str, body: &RigidBody) -> Table {
-        let of_parts: Vec<Table> = self.surfaces_of_parts(body);
-        let of_part = |n: usize| of_parts.get(n).cloned().unwrap_or_default();
-        let mut t = Table::of("shape", self.meshes.shape_of_parts(body.shape(), &of_part));
+        let mut t = Table::of("shape", self.solid(body.shape(), body, 0));
         if !body.is_fixed() {
             t.extend(mass(body));
         }
@@ -64,13 +62,24 @@ impl Writer<'_> {
         t
     }
 
-    /// Returns the surface keys of each part of a compound, as far as they differ from those of the body.
-    fn surfaces_of_parts(&self, body: &RigidBody) -> Vec<Table> {
-        let Some((last, _)) = body.shape_materials().last() else { return Vec::new() };
-        let mut tables = vec![Table::default(); last + 1];
-        for (n, material) in body.shape_materials() {
+    /// Returns the shape of a part that collides, with the names and the own surfaces of its shapes.
+    pub(super) fn solid(&mut self, shape: &Shape, body: &dyn Collidable, part: usize) -> Table {
+        let mut tables = self.surfaces_of_parts(shape.part_count(), &body.material(part), body.shape_materials(part));
+        for (n, t) in tables.iter_mut().enumerate() {
+            body.shape_name(part, n).iter().for_each(|name| t.put("name", *name));
+        }
+        let whole = tables.first().cloned().filter(|_| !matches!(shape, Shape::Compound(_)));
+        let mut t = self.meshes.shape_of_parts(shape, &|n| tables.get(n).cloned().unwrap_or_default());
+        t.extend(whole.unwrap_or_default());
+        t
+    }
+
+    /// Returns the surface keys of each part of a compound with `count` parts, as far as they differ from those of the whole.
+    fn surfaces_of_parts(&self, count: usize, whole: &Material, own: &[(usize, Material)]) -> Vec<Table> {
+        let mut tables = vec![Table::default(); count];
+        for (n, material) in own {
             let t = &mut tables[*n];
-            let base = if material.id == body.material.id { body.material } else { self.surface_of(material, t).0 };
+            let base = if material.id == whole.id { *whole } else { self.surface_of(material, t).0 };
             let constants = surface::contact(material, &base);
             if t.is_empty() && constants.is_empty() {
                 t.put("friction", material.friction);

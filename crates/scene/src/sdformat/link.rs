@@ -11,7 +11,7 @@ use crate::parse::bound::Bound;
 use crate::parse::link::{Geometry, LinkMassSpec, LinkShape, Surface};
 use crate::parse::shape::ShapeSpec;
 use crate::urdf::link::{Context, mended, mesh_file};
-use crate::xml::Element;
+use crate::xml::{Element, check_names, shape_name};
 
 /// Density of a link whose inertia is to be computed from its shapes, kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -40,6 +40,7 @@ impl<'a, 'd> LinkElement<'a, 'd> {
         let pose = frames.pose(&name)?;
         let mass = read_inertial(&element, &name, frames, context);
         let mut link = LinkElement { name, element, pose, mass, shapes: Vec::new(), planes: Vec::new() };
+        check_names(element.children("collision"), "a link");
         for (tag, collides) in [("collision", true), ("visual", false)] {
             for part in element.children(tag) {
                 link.read_shape(part, collides, frames, context);
@@ -65,7 +66,9 @@ impl<'a, 'd> LinkElement<'a, 'd> {
         let Some((geometry, turned)) = read_geometry(&geometry, collides, context) else { return };
         pose *= turned;
         let surface = read_surface(&part, context);
-        let shape = LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides };
+        let name = shape_name(&part).filter(|_| collides);
+        let visible = !collides;
+        let shape = LinkShape { pose, geometry, mass: None, surface, collides, visible, name, one_way: None };
         if shape.geometry == Geometry::Shape(ShapeSpec::HalfSpace) {
             self.planes.push((part, shape));
         } else {

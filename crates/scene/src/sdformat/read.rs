@@ -195,6 +195,7 @@ impl Reading {
             orientation_xyzw: pose.rotation.coords.into(),
             contact: shape.surface.contact,
             visible: !level,
+            shape_name: shape.name,
             ..floor.bodies[0].clone()
         });
     }

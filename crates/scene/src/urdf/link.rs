@@ -17,7 +17,7 @@ use crate::parse::bound::Bound;
 use crate::parse::link::{Geometry, InertiaFault, LinkShape, inertia_fault};
 use crate::parse::rotation;
 use crate::parse::shape::ShapeSpec;
-use crate::xml::Element;
+use crate::xml::{Element, check_names, shape_name};
 
 /// Context shared by all links of a file.
 pub(crate) struct Context<'c> {
@@ -109,6 +109,7 @@ pub(crate) fn mended(element: &Element<'_, '_>, inertia: Mat3, context: &mut Con
 }
 
 fn read_shapes(link: &Element<'_, '_>, context: &mut Context<'_>) -> Vec<LinkShape> {
+    check_names(link.children("collision"), "a link");
     let read = |tag: &'static str, context: &mut Context<'_>| -> (Vec<LinkShape>, usize) {
         let all: Vec<_> = link.children(tag).map(|element| read_shape(&element, tag == "collision", context)).collect();
         let dropped = all.iter().filter(|shape| shape.is_none()).count();
@@ -134,7 +135,8 @@ pub(super) fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mu
     {
         surface.appearance.color = color;
     }
-    Some(LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides })
+    let name = shape_name(element).filter(|_| collides);
+    Some(LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides, name, one_way: None })
 }
 
 fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Color> {

@@ -33,6 +33,7 @@ mod scenes_in_motion;
 mod sdformat;
 mod sdformat_damaged;
 mod sensors;
+mod shape_names;
 mod shipped;
 mod spheres;
 mod state_hashes;

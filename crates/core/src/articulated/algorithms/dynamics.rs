@@ -70,6 +70,11 @@ impl Dynamics {
         }
     }
 
+    /// Takes the armatures of the model, from the next [`refresh`](Self::refresh) on.
+    pub(in crate::articulated) fn set_armatures(&mut self, model: &Model) {
+        self.compiled.set_armatures(model);
+    }
+
     /// Returns the number of moving links.
     pub fn links(&self) -> usize {
         self.compiled.bodies.len()

@@ -50,6 +50,11 @@ impl FreeMotion {
         }
     }
 
+    /// Takes the armatures of the model.
+    pub fn set_armatures(&mut self, model: &Model) {
+        self.dynamics.set_armatures(model);
+    }
+
     /// Advances `x = [q, v]` by `h` seconds of free motion.
     pub fn advance(&mut self, model: &Model, x: &mut [f64], h: f64) {
         let n = model.positions();

@@ -69,6 +69,13 @@ pub(in crate::articulated) struct Compiled {
 }
 
 impl Compiled {
+    /// Takes the armatures of the model, which may change between steps.
+    pub fn set_armatures(&mut self, model: &Model) {
+        for (body, link) in self.bodies.iter_mut().zip(model.links()) {
+            body.armature = link.armature;
+        }
+    }
+
     pub fn new(model: &Model) -> Compiled {
         let mut compiled = Compiled {
             bodies: Vec::with_capacity(model.links().len()),

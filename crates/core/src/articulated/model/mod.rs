@@ -327,6 +327,18 @@ impl ModelBuilder {
 }
 
 impl Model {
+    /// Sets the [`armature`](Link::armature) of the joint of a moving link, by its number.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the joint has none, the value is out of its range, or nothing that the joint moves has an inertia
+    /// without it. Nothing is changed then.
+    pub(crate) fn set_armature(&mut self, link: usize, armature: f64) -> Result<(), ModelError> {
+        let own = &mut self.links[link];
+        check_armature(&own.name, &own.joint, armature)?;
+        let before = std::mem::replace(&mut own.armature, armature);
+        self.check_masses().inspect_err(|_| self.links[link].armature = before)
+    }
+
     fn add(&mut self, number: usize, added: Added) -> Result<(), ModelError> {
         let Added { name, parent, joint, mut placement, mass, armature } = added;
         if parent.is_some_and(|p| p >= number) {

@@ -5,7 +5,6 @@ use super::event::{DUE, FIRED, KEY, OTHER, STAMP, TIME};
 use super::trigger::Trigger;
 use crate::world::view::ObjectId;
 use crate::world::{Core, Event, EventKind, StepError, World};
-use tumble_collide::Vec3;
 
 /// An event that fires: its id, and the serial number of the other body plus 1.
 type Firing = (ObjectId, u32);
@@ -64,8 +63,7 @@ impl Core {
         }
         for &(a, other) in &all {
             let b = self.other(other);
-            let zero = Vec3::zeros();
-            self.events.push(Event { kind: EventKind::Fired, a, part_a: 0, b, part_b: 0, impulse: zero, point: zero });
+            self.events.push(Event::of(EventKind::Fired, a, b));
         }
         all
     }

@@ -347,7 +347,11 @@ fn contacts_are_sent_up_to_a_number() {
         let mut world = World::default();
         world.add(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
         for (name, mass) in [("light", 1.0), ("heavy", 2.0)] {
-            let body = RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name).with_mass(mass);
+            // the ball that rests on the ground is the second shape of its body
+            let above = CompoundPart::new(Shape::sphere(1e-4).unwrap(), Pose::translation(0.0, 0.0, 0.2));
+            let ball = CompoundPart::new(Shape::sphere(0.1).unwrap(), Pose::identity());
+            let shape = Shape::compound(vec![above, ball]).unwrap();
+            let body = RigidBody::new(shape).with_name(name).with_mass(mass);
             world.add(body.with_pose(Pose::translation(mass, 0.0, 0.1))).unwrap();
         }
         world
@@ -366,6 +370,8 @@ fn contacts_are_sent_up_to_a_number() {
         for (contact, wanted) in there.contacts().iter().zip(wanted) {
             assert!(name(contact).contains(&wanted.to_string()) && name(contact).contains(&"ground".to_string()));
             let sent = of(here, wanted);
+            assert_eq!([contact.shape_a, contact.shape_b], [sent.shape_a, sent.shape_b]);
+            assert_eq!(contact.shape_a + contact.shape_b, 1);
             assert!((contact.force - sent.force).amax() < 2e-6 * sent.force.amax() && sent.force.norm() > 9.0);
             assert!((contact.point - sent.point).amax() < 1e-6 && (contact.normal - sent.normal).amax() < 1e-6);
             assert!((contact.depth - sent.depth).abs() < 1e-6);
@@ -393,10 +399,10 @@ fn wrong_contacts_are_refused_with_their_frame() {
     let before = pair.mirror.hash();
     good.truncate(good.len() - 4); // the count, 0
     let entry = |object: u32, part: u32, x: f32| {
-        let indices = [object, part, 0, 0].map(u32::to_le_bytes).concat();
+        let indices = [object, part, 3, 0, 0, 0].map(u32::to_le_bytes).concat();
         [&1u32.to_le_bytes()[..], &indices, &[x; 10].map(f32::to_le_bytes).concat()].concat()
     };
-    let cut = entry(0, 0, 1.0)[..59].to_vec();
+    let cut = entry(0, 0, 1.0)[..67].to_vec();
     let many = 257u32.to_le_bytes().to_vec();
     for bad in [entry(99, 0, 1.0), entry(0, 7, 1.0), entry(0, 0, f32::NAN), cut, many, vec![], vec![0; 5]] {
         assert!(pair.mirror.apply_state(2, 0.5, &[&good[..], &bad].concat()).is_err());
@@ -404,4 +410,5 @@ fn wrong_contacts_are_refused_with_their_frame() {
     }
     pair.mirror.apply_state(2, 0.5, &[&good[..], &entry(0, 0, 1.0)].concat()).unwrap();
     assert_eq!(pair.mirror.world().contacts().len(), 1);
+    assert_eq!(pair.mirror.world().contacts()[0].shape_a, 3);
 }

@@ -9,7 +9,7 @@ use crate::objects::joint::Joint;
 use crate::objects::mimic::Mimic;
 use crate::objects::sensor::Sensor;
 use crate::objects::shapes::Shape;
-use crate::world::add::{add, articulated, named_shape, rigid};
+use crate::world::add::{add, articulated, named_shape, rigid, solid};
 use crate::world::class::World;
 use crate::world::joints;
 use crate::world::mimics;
@@ -18,7 +18,7 @@ use crate::world::sensors;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::collide::{ContactMode, Vec3};
-use tumble::dynamics::{Material, Mode, RigidBody as Rigid, SensorNoise};
+use tumble::dynamics::{Material, Mode, SensorNoise};
 
 #[pymethods]
 impl World {
@@ -127,7 +127,7 @@ impl World {
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
-        let mut body = Rigid::fixed(shape.solid.clone())
+        let mut body = solid(&shape)
             .with_name(name)
             .with_pose(pose)
             .with_material(Material { restitution, friction, ..Material::default() })

@@ -1,14 +1,17 @@
 //! Queries of the present of a world: contacts, events, rays, overlaps, distances, energy, the report of a step.
 
 use crate::arrays::convert::{vector, whole_number};
-use crate::errors::Result;
+use crate::errors::{Error, Result};
+use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
+use crate::world::add::own_place;
 use crate::world::class::World;
 use crate::world::contacts;
 use crate::world::query::{self, Selection};
 use crate::world::report::StepReport;
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 
 #[pymethods]
 impl World {
@@ -16,7 +19,7 @@ impl World {
     ///
     /// Fields: ``bodies`` (2,), indices in ``world.bodies``, -1 for other objects; ``parts`` (2,),
     /// for articulated bodies the indices of the links in their ``link_names``; ``shapes`` (2,), as
-    /// ``shape`` in ``cast_rays``; ``point`` (3,), m;
+    /// ``shape`` in ``cast_rays``, whose names ``shape_name`` returns; ``point`` (3,), m;
     /// ``normal`` (3,), unit, from the second body to the first; ``depth``, m, negative while
     /// apart; ``velocity`` (3,) of the first relative to the second before the contact was solved,
     /// m/s; ``impulse`` (3,) on the first over the last sub-step, N·s; ``force`` (3,), N, without
@@ -27,13 +30,14 @@ impl World {
     }
 
     /// The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
-    /// ``impulse``, ``point``.
+    /// ``impulse``, ``point``, ``shapes``, ``shape_names``.
     ///
     /// kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
     /// ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
     /// of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
     /// ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
-    /// acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes.
+    /// acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes. shapes, shape_names: the shapes
+    /// that touch there, as in ``contacts``, and their names.
     ///
     /// Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
     /// at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact
@@ -41,6 +45,30 @@ impl World {
     #[getter]
     fn events(&self, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
         contacts::events(&self.shared, py)
+    }
+
+    /// Returns the name of a shape, or None if it has none, by the numbers that ``contacts`` and queries report.
+    ///
+    /// body: number in ``bodies``, a handle or a name; part, shape: the numbers beside it.
+    fn shape_name(
+        &self,
+        body: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = whole_number)] part: usize,
+        #[pyo3(from_py_with = whole_number)] shape: usize,
+    ) -> Result<Option<String>> {
+        let named = body.is_instance_of::<PyString>() || body.extract::<usize>().is_err();
+        let handle = named.then(|| own_place(&self.shared, body)).transpose()?;
+        self.shared.read(|inner| {
+            let id = match &handle {
+                Some(place) => place.id,
+                None => {
+                    let (ids, number) = (body_ids(&inner.world), body.extract::<usize>()?);
+                    let none = || Error::value(format!("body is {number}; the world has {} bodies", ids.len()));
+                    *ids.get(number).ok_or_else(none)?
+                }
+            };
+            contacts::shape_name(inner, id, part, shape)
+        })
     }
 
     /// Returns where rays enter bodies: a structured array with one row per ray.

@@ -5,8 +5,9 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{Collidable, Mode, Object, ObjectId, RigidBody};
 
+use super::super::names::Taken;
 use super::MjcfWriter;
-use super::geoms::{about_frame, visual_of};
+use super::geoms::visual_of;
 use super::xml::{Attributes, numbers, vector, wxyz};
 
 impl MjcfWriter<'_> {
@@ -65,26 +66,11 @@ impl MjcfWriter<'_> {
         let mut left: Vec<_> = body.renderable().map_or(&[][..], |r| r.visuals()).iter().collect();
         let visual = visual_of(&mut left, body.shape(), &Pose::identity());
         let Some(parts) = body.collidable() else { return };
-        let mut common = self.surface(name, parts, 0, collides, visual.map(|visual| &visual.appearance));
-        if let Some(label) = label.filter(|_| !matches!(body.shape(), Shape::Compound(_))) {
-            common.put("name", label);
-        }
-        if body.one_way.is_some() {
-            self.note(name, "bodies that collide on one side only collide on all sides in MuJoCo");
-        }
+        let common = self.surface(name, parts, 0, collides, visual.map(|visual| &visual.appearance));
         if parts.is_sensor(0) {
             self.note(name, "bodies that only report overlaps do not collide in MuJoCo, and report nothing");
         }
-        match body.shape() {
-            Shape::Compound(compound) if collides && !parts.is_sensor(0) && !body.shape_materials().is_empty() => {
-                for (n, part) in compound.parts().iter().enumerate() {
-                    let own = self.friction(name, &body.shape_material(n));
-                    let others = common.without(&["friction", "condim"]);
-                    self.geoms(name, &(pose * part.pose), &part.shape, &others.joined(&own));
-                }
-            }
-            shape => self.geoms(name, pose, shape, &common),
-        }
+        self.solid(name, (parts, 0), pose, (collides, label), &common);
         let center = Pose::from_parts(Translation3::from(body.shape().center_of_mass()), nalgebra::one());
         for visual in left.into_iter().filter(|visual| visual.drawn().is_some()) {
             let mut visual = visual.clone();
@@ -113,17 +99,43 @@ impl MjcfWriter<'_> {
         self.xml.leaf("inertial", &t);
     }
 
-    /// Writes a shape that a link carries, by the pose of its own frame.
-    pub(super) fn collider(
+    /// Writes the shape of a part that collides, by the pose of its own frame, with the names and surfaces of its shapes. `label`
+    /// is the name of a whole shape instead of its own.
+    pub(super) fn solid(
         &mut self,
         owner: &str,
-        parts: &dyn Collidable,
-        part: usize,
+        (parts, part): (&dyn Collidable, usize),
         pose: &Pose,
+        (collides, label): (bool, Option<&str>),
         common: &Attributes,
     ) {
-        if let Some(shape) = parts.shape(part) {
-            self.geoms(owner, &(pose * about_frame(shape)), &shape.clone(), common);
+        let Some(shape) = parts.shape(part) else { return };
+        let named = |name: Option<&str>, to: Attributes, taken: &mut Taken| match name {
+            Some(name) => to.with("name", taken.unique(name.to_owned())),
+            None => to,
+        };
+        if parts.one_way(part).is_some() {
+            self.note(owner, "shapes that collide on one side only collide on all sides in MuJoCo");
+        }
+        let Shape::Compound(compound) = shape else {
+            let own = parts.shape_name(part, 0);
+            if let (Some(label), Some(own)) = (label, own.filter(|own| label.is_some_and(|label| label != *own))) {
+                self.note(
+                    owner,
+                    format!("its geom has the name of the body, {label}, and not that of the shape, {own}"),
+                );
+            }
+            let common = named(label.or(own), common.clone(), &mut self.shapes);
+            return self.geoms(owner, pose, shape, &common);
+        };
+        for (n, piece) in compound.parts().iter().enumerate() {
+            let own = parts.shape_materials(part).iter().find(|(shape, _)| *shape == n);
+            let surface = match own.filter(|_| collides && !parts.is_sensor(part)) {
+                Some((_, material)) => common.without(&["friction", "condim"]).joined(&self.friction(owner, material)),
+                None => common.clone(),
+            };
+            let common = named(parts.shape_name(part, n), surface, &mut self.shapes);
+            self.geoms(owner, &(pose * piece.pose), &piece.shape, &common);
         }
     }
 }

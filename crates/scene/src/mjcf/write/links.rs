@@ -23,7 +23,7 @@ use tumble_core::{ArticulatedBody, Joint, Mode, Object, ObjectId};
 
 use super::MjcfWriter;
 use super::bodies::put_rotation;
-use super::geoms::visual_of;
+use super::geoms::{about_frame, visual_of};
 use super::joints::coupled;
 use super::xml::{Attributes, numbers, vector};
 
@@ -226,7 +226,8 @@ impl MjcfWriter<'_> {
             let pose = body.part_pose(part);
             let visual = visual_of(&mut left, shape, &pose);
             let common = self.surface(&owner, parts, part, tree.collides, visual.map(|visual| &visual.appearance));
-            self.collider(&owner, parts, part, &pose, &common);
+            let pose = pose * about_frame(shape);
+            self.solid(&owner, (parts, part), &pose, (tree.collides, None), &common);
         }
         left.into_iter().for_each(|visual| self.visual_geom(&owner, visual));
         for frame in model.frames().iter().filter(|f| f.link == link) {

@@ -91,6 +91,8 @@ pub struct MjcfWriter<'w> {
     assets: Assets,
     groups: Groups,
     bodies: Taken,
+    /// Names of geoms.
+    shapes: Taken,
     joints: Taken,
     sites: Taken,
     actuators: Taken,
@@ -125,6 +127,7 @@ impl<'w> MjcfWriter<'w> {
             assets: Assets::default(),
             groups: Groups::default(),
             bodies: Taken::default(),
+            shapes: Taken::default(),
             joints: Taken::default(),
             sites: Taken::default(),
             actuators: Taken::default(),

@@ -1,0 +1,132 @@
+//! The shapes of a link: their numbers, names and surface constants.
+//!
+//! The shapes of a link are numbered over its colliders in the order of their parts, where the parts of a compound count
+//! one by one. Shapes of fixed links belong to the link into which these are folded, and those on the base to the first
+//! link there; their names then begin with the name of their own link, as in `tool/pad`.
+
+use super::body::{ArticulatedBody, ArticulatedError};
+use super::collider::Collider;
+use crate::BodyError;
+use crate::object::Material;
+use crate::rigid::check_shape_name;
+use tumble_collide::{Shape, Vec3};
+
+impl ArticulatedBody {
+    /// Returns the shapes of a moving link, or of the base for `None`, by their numbers: part, index in a compound and name.
+    pub fn shapes_of(&self, link: Option<usize>) -> impl Iterator<Item = (usize, usize, Option<&str>)> {
+        self.colliders_of(link).filter_map(|part| Some((part, self.collider(part)?))).flat_map(|(part, found)| {
+            let collider = &found.collider;
+            (0..collider.shape.part_count()).map(move |shape| (part, shape, name_of(collider, shape)))
+        })
+    }
+
+    /// Returns the number of a shape on its link, for the part and the index that contacts report.
+    pub fn shape_number(&self, part: usize, shape: usize) -> usize {
+        let found = self.shapes_of(self.link_of(part)).position(|(p, s, _)| (p, s) == (part, shape));
+        found.unwrap_or(shape)
+    }
+
+    /// Returns the part and the index of the shape of that name on a link, which may be a fixed one; `None` without one.
+    pub fn shape_named(&self, link: &str, name: &str) -> Option<(usize, usize)> {
+        let carrier = self.model.frame(link)?.link;
+        let full = if self.carries(link, carrier) { name.to_owned() } else { format!("{link}/{name}") };
+        let found = self.shapes_of(carrier).find(|(_, _, own)| *own == Some(&full));
+        found.map(|(part, shape, _)| (part, shape))
+    }
+
+    /// Returns the surface constants of a shape, for the part and the index that contacts report; `None` if there is none.
+    pub fn shape_material(&self, part: usize, shape: usize) -> Option<Material> {
+        let collider = &self.collider(part)?.collider;
+        let own = collider.shape_materials.get(shape);
+        (shape < collider.shape.part_count()).then(|| own.unwrap_or(collider.material))
+    }
+
+    /// Sets the surface constants of a shape: those of a part of a compound, where `None` gives it those of the compound
+    /// again, or those of a whole collider, which `None` leaves.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Collider`] if there is no such shape, or a constant is out of its range. Nothing is changed then.
+    pub fn set_shape_material(
+        &mut self,
+        part: usize,
+        shape: usize,
+        material: Option<Material>,
+    ) -> Result<(), ArticulatedError> {
+        let carrier = self.link_of(part);
+        let (body, link) = (self.name.clone(), self.carrier_name(carrier).to_owned());
+        let wrong = |why| ArticulatedError::Collider { body, link, why };
+        if let Some((what, value, expected)) = material.and_then(|material| material.validate().err()) {
+            return Err(wrong(BodyError::Range { what, value, expected }));
+        }
+        let Some(found) = self.collider_mut(part).filter(|found| shape < found.collider.shape.part_count()) else {
+            let expected = "below the number of parts of a collider of the body";
+            return Err(wrong(BodyError::Range { what: "index of a shape", value: shape as f64, expected }));
+        };
+        match (is_compound(&found.collider.shape), material) {
+            (true, material) => found.collider.shape_materials.set(shape, material),
+            (false, Some(material)) => found.collider.material = material,
+            (false, None) => {}
+        }
+        Ok(())
+    }
+
+    /// Returns the name of the link to which the shapes of a moving link, or of the base, are counted.
+    fn carrier_name(&self, carrier: Option<usize>) -> &str {
+        match carrier {
+            Some(link) => &self.model.links()[link].name,
+            None => self.model.frames().iter().find(|frame| frame.link.is_none()).map_or("", |frame| &frame.name),
+        }
+    }
+
+    /// Returns whether the shapes of a link are counted to the link itself.
+    fn carries(&self, link: &str, carrier: Option<usize>) -> bool {
+        self.carrier_name(carrier) == link
+    }
+
+    /// Puts the name of a folded link before the names of its shape.
+    pub(super) fn name_within(&self, link: &str, carrier: Option<usize>, collider: &mut Collider) {
+        if !self.carries(link, carrier) {
+            collider.name.iter_mut().filter(|name| !name.is_empty()).for_each(|name| *name = format!("{link}/{name}"));
+            collider.shape = collider.shape.with_names_in(link);
+        }
+    }
+
+    /// Checks a collider that is added to a moving link, or to the base.
+    pub(super) fn check_collider(&self, carrier: Option<usize>, collider: &Collider) -> Result<(), BodyError> {
+        if let Some(name) = &collider.name {
+            check_shape_name(name, &collider.shape)?;
+        }
+        let count = collider.shape.part_count();
+        let before = self.shapes_of(carrier).count();
+        for (shape, name) in (0..count).filter_map(|shape| Some((shape, name_of(collider, shape)?))) {
+            if let Some(first) = self.shapes_of(carrier).position(|(_, _, own)| own == Some(name)) {
+                return Err(BodyError::ShapeNames { first, second: before + shape, name: name.into() });
+            }
+        }
+        if let Some((shape, _)) = collider.shape_materials.as_slice().last()
+            && (*shape >= count || !is_compound(&collider.shape))
+        {
+            let (what, expected) = ("index of a shape with a material", "below the number of parts of a compound");
+            return Err(BodyError::Range { what, value: *shape as f64, expected });
+        }
+        for (_, material) in collider.shape_materials.as_slice() {
+            material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
+        }
+        match collider.one_way.map(|direction: Vec3| direction.norm()) {
+            Some(length) if !(length.is_finite() && length > 0.0) => {
+                let (what, expected) = ("length of the one-way direction", "above 0");
+                Err(BodyError::Range { what, value: length, expected })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn is_compound(shape: &Shape) -> bool {
+    matches!(shape, Shape::Compound(_))
+}
+
+/// Returns the name of a shape of a collider.
+pub(super) fn name_of(collider: &Collider, shape: usize) -> Option<&str> {
+    collider.name.as_deref().filter(|_| shape == 0).or_else(|| collider.shape.part_name(shape))
+}
