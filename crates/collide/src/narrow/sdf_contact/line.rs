@@ -6,8 +6,9 @@
 //! above the margin, the search ends; otherwise it is the next sample. On flat faces a few samples
 //! are exact.
 //!
-//! For other bodies the edge is first halved into short pieces, and pieces too far away are dropped
-//! (`d_B` changes by at most 1 m per meter). Within a piece the function is treated as convex until
+//! For other bodies a long edge is first divided into parts (`line_parts.rs`): those over faces and
+//! valleys need no search, those over a ridge are one piece. The others are halved into short pieces,
+//! and pieces too far away are dropped (`d_B` changes by at most 1 m per meter). Within a piece the function is treated as convex until
 //! a sample lies below the tangent of another one. Then B has a valley between them, perhaps with a
 //! second minimum, so that part is halved a few times.
 //!
@@ -23,9 +24,11 @@
 
 use super::super::reduce::Collector;
 use super::hyperbola::Hyperbola;
+use super::line_parts::{Part, Shape};
 use super::query::{Normals, Query};
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, MAX_PIECE, SLOPE_ROUNDING};
 use crate::sdf::elements::{Edge, max_slope};
+use crate::sdf::field::Segment;
 use crate::sdf::{FACING, Feature, Hit, TOUCHING, facing};
 use crate::{NormalFrom, Vec3};
 use nalgebra::RealField;
@@ -115,7 +118,20 @@ impl Query<'_> {
                 self.search(&line, start, self.sample(&line, length), found);
             }
         } else {
-            self.halve(&line, (0.0, None), (length, None), found);
+            self.by_parts(&line, found);
+        }
+    }
+
+    /// Searches a line whose distance is not convex: a long edge by the parts on which it is.
+    fn by_parts(&self, line: &Line, found: &mut Collector) {
+        let mut last = None;
+        let whole = Segment { start: line.start, along: line.along, from: 0.0, to: line.length };
+        for Part { from, to, shape } in self.parts_of(line.edge, &whole, line.normals, found.limit()) {
+            last = match shape {
+                Shape::Concave => None,
+                Shape::Convex => self.piece(line, (from, last), (to, None), found)[1],
+                Shape::Unknown => self.halve(line, (from, last), (to, None), found)[1],
+            };
         }
     }
 
@@ -144,6 +160,17 @@ impl Query<'_> {
             }
             return [first, last];
         }
+        self.piece(line, low, high, found)
+    }
+
+    /// Searches a piece whose distance is treated as convex. Returns the samples at its ends.
+    fn piece(
+        &self,
+        line: &Line,
+        low: (f64, Option<Sample>),
+        high: (f64, Option<Sample>),
+        found: &mut Collector,
+    ) -> [Option<Sample>; 2] {
         // the minimum of a piece that rises steeply from either end is at that end
         let start = low.1.unwrap_or_else(|| self.sample(line, low.0));
         if start.slope >= FLAT_SLOPE && high.1.is_none() {
@@ -378,9 +405,10 @@ impl Query<'_> {
         if sample.hit.distance.min(sample.height(outer.s)) - line.radius > found.limit() {
             return;
         }
-        let s = self.exit_place(line, sample, outer);
-        // the start is an end of the element, or belongs to another piece
-        if (s - sample.s).abs() > 1e-6 * self.size {
+        let (s, tolerance) = (self.exit_place(line, sample, outer), 1e-6 * self.size);
+        // an end of the element is tested as a point
+        let is_end = |s: f64| s <= tolerance || s >= line.length - tolerance;
+        if (s - sample.s).abs() > tolerance || !is_end(s) {
             self.push_on_face(line, sample, s, if outer.s > sample.s { 2 } else { 1 }, found);
         }
     }

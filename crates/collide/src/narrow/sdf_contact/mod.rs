@@ -14,6 +14,7 @@ mod cone;
 mod ellipsoid;
 mod hyperbola;
 mod line;
+mod line_parts;
 mod mesh_convex_depth;
 mod mesh_mesh_depth;
 mod min_translation;

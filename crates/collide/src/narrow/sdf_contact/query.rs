@@ -2,14 +2,16 @@
 //! and their contacts.
 
 use super::super::reduce::Collector;
+use super::line_parts::Parts;
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, SLOPE_ROUNDING};
 use super::{Body, BodyElements};
-use crate::sdf::elements::{Edge, Elements, Group, MAX_CHILDREN, Point};
+use crate::sdf::elements::{Edge, Elements, Group, MAX_CHILDREN, Point, Row};
 use crate::sdf::field::{FrameMap, MeshField};
 use crate::sdf::{DistanceField, Feature, Hit, OVERHANG};
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
 use arrayvec::ArrayVec;
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 
 /// Normals of an element, in the frame of the field.
 pub(super) type Normals = ArrayVec<Vec3, 12>;
@@ -44,6 +46,9 @@ pub(super) struct Query<'a> {
     /// In the second query, whose field is A's: the pose of A in B.
     pub(super) second: Option<&'a Pose>,
     cache: &'a NearestCache,
+    /// Rows of edges of the body with the elements, and the parts of those that were searched.
+    pub(super) rows: &'a [Row],
+    pub(super) parts_of_rows: RefCell<BTreeMap<u32, Parts>>,
     /// Map from the element's frame to the field of a mesh.
     frame_map: Option<FrameMap>,
     /// Smallest distance of all samples, minus their radius.
@@ -91,6 +96,8 @@ impl<'a> Query<'a> {
             is_cylinder: matches!(one.elements, BodyElements::Cylinder { .. }),
             second,
             cache,
+            rows: if let BodyElements::Mesh(elements) = &one.elements { &elements.rows } else { &[] },
+            parts_of_rows: RefCell::default(),
             frame_map,
             min_distance: Cell::new(f64::INFINITY),
         }

@@ -25,12 +25,14 @@
 //! edges. Without that test the vertices ahead of a body would stop its motion over a flat part.
 
 mod groups;
+mod rows;
 mod support;
 
 use crate::bytes::{Reader, Write};
 use crate::mesh::{EdgeGroups, face_normals};
 use crate::{SphereTree, TriMesh, Vec3};
 use nalgebra::ComplexField;
+pub(crate) use rows::Row;
 
 /// `ε`: largest error of the gap of two crossing edges, as a fraction of the diagonal.
 pub(crate) const EDGE_ERROR: f64 = 2e-4;
@@ -97,6 +99,10 @@ pub(crate) struct Edge {
     pub normals: [Vec3; 2],
     /// Identifier of the edge.
     pub index: u32,
+    /// Its row in [`Elements::rows`], or [`rows::NO_ROW`], and the distances of its ends from the
+    /// start of the row, meters.
+    pub row: u32,
+    pub places: [f64; 2],
 }
 
 /// All features of a mesh, grouped by the nodes of the sphere tree.
@@ -104,6 +110,7 @@ pub(crate) struct Edge {
 pub(crate) struct Elements {
     pub points: Vec<Point>,
     pub edges: Vec<Edge>,
+    pub rows: Vec<Row>,
     pub normals: Vec<Vec3>,
     pub edge_directions: Vec<Vec3>,
     /// Unit directions of the edges that are not searched, in single precision.
@@ -171,6 +178,7 @@ impl Elements {
         let (mut edges, searched) = gather_edges(mesh, groups, &face);
         all.gather_points(mesh, &face, &searched, &edges);
         edges.sort_by_key(|e| (e.points[0], e.fine, e.index));
+        all.rows = rows::rows(&mut edges, mesh.vertices.len());
         for point in &mut all.points {
             let of = |fine: bool| {
                 (
@@ -381,6 +389,8 @@ fn gather_edges(mesh: &TriMesh, groups: &EdgeGroups, face: &[Vec3]) -> (Vec<Edge
             fine: false,
             normals,
             index: index as u32,
+            row: rows::NO_ROW,
+            places: [0.0; 2],
         };
         let turn = edge.turn();
         let smooth = group.len() == 2 && turn < SMOOTH_ANGLE && length < SMOOTH_LENGTH * diagonal;

@@ -12,6 +12,7 @@ mod blocks;
 mod builder;
 mod cell_view;
 mod faces;
+mod near_line;
 mod octree;
 mod triangles;
 
@@ -19,6 +20,7 @@ use super::{DistanceField, Feature, Hit, facing, opposition};
 use crate::mesh::{EdgeGroups, closest_on_triangle, shells};
 use crate::{Mat3, MeshDistance, TriMesh, Vec3};
 use arrayvec::ArrayVec;
+pub(crate) use near_line::{Segment, TriangleNearLine};
 pub(crate) use octree::FrameMap;
 use octree::{CellPoint, Octree};
 use std::sync::OnceLock;
@@ -217,6 +219,17 @@ impl MeshField {
     #[inline]
     pub fn bound_mapped(&self, way: &FrameMap, p: &[f32; 3]) -> f64 {
         self.tree.bound_mapped(way, p, &self.triangles)
+    }
+
+    /// Calls `each` with every triangle that can be within `reach` of a segment, until it returns
+    /// false. Returns whether all were visited.
+    pub fn each_near_line<'a>(
+        &'a self,
+        segment: &Segment,
+        reach: f64,
+        each: impl FnMut(TriangleNearLine<'a>) -> bool,
+    ) -> bool {
+        self.triangles.each_near_line(segment, reach, each)
     }
 
     /// Returns the closest point by the tree of boxes.

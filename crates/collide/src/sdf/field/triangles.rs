@@ -84,7 +84,7 @@ impl Triangles {
         Hit { distance, nearest: distance, normal, core: 0.0, feature, facing: true }
     }
 
-    fn boxes(&self) -> &AabbTree {
+    pub fn boxes(&self) -> &AabbTree {
         self.boxes.get_or_init(|| AabbTree::new(&self.corners))
     }
 
