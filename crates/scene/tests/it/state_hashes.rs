@@ -50,14 +50,14 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "a324bc50eab8fdec", "5ba2a1c2fde17086";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "80e95da1168215c7";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "172fe9b2361d84a5";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "f6e9e6d3b6125c72";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "95d1a5d8a2efe886";
     chain_time_stepping: "chain", TimeStepping, "f47e2b35690a2684", "ee8524465209ed50";
     chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
-    falling_time_stepping: "falling", TimeStepping, "be3988048208f897", "f93c0dd439b1b701";
+    falling_time_stepping: "falling", TimeStepping, "0068eeac1a1f03dd", "bb641edf06048f32";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "2b00009a085184fe", "7bfc4560967d462c";
+    falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "3253ca0ba3cf7f3f";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
@@ -94,7 +94,7 @@ table! {
     arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
     walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "3516c95fdc90d58f";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "999f55b2fdaf7618", "9e57e55efc92bfa2";
-    mechanism_time_stepping: "mechanism", TimeStepping, "781ddb3ba323cb6c", "0294bf65469db807";
+    mechanism_time_stepping: "mechanism", TimeStepping, "7e2d4f05a0a39919", "df85d4c9a9b121eb";
     dominoes_time_stepping: "dominoes", TimeStepping, "fe44a6680e801f5a", "c798dcaf8ca85ed0";
 }
 
@@ -106,6 +106,6 @@ table! {
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "4e9f28f0d690f8d4";
     walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
-    mechanism_backtracking: "mechanism", Backtracking, "d95e4646ca906fd2", "509fb9fd60f8aca4";
+    mechanism_backtracking: "mechanism", Backtracking, "9f6247fa41a74b24", "abb36c4a32f75eb8";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "1d7fafc6ac54b274", "9f5c6d9320b43b95";
 }
