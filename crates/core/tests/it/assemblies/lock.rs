@@ -124,7 +124,7 @@ fn lock(cuts: [f64; 5]) -> (World, ObjectId, ObjectId, usize) {
 fn turn(cuts: [f64; 5]) -> (f64, f64) {
     let (mut world, key, plug, triangles) = lock(cuts);
     assert!(triangles <= 20_000, "{triangles}");
-    let mut overlap = [0.0f64; 2];
+    let (mut overlap, mut unconverged) = ([0.0f64; 2], [0; 2]);
     let push = |world: &mut World, force: f64| {
         let at = position(world, key);
         world.apply_force(key, 0, Vec3::z() * force, &at).unwrap();
@@ -133,6 +133,7 @@ fn turn(cuts: [f64; 5]) -> (f64, f64) {
         let speed = world.part_state(key, 0).unwrap().velocity.z;
         push(world, -20.0 - 60.0 * speed);
         overlap[0] = overlap[0].max(world.report().max_penetration);
+        unconverged[0] += u32::from(world.report().unconverged > 0);
     });
     let placed = |id: ObjectId| world.body(id).unwrap().position();
     let error = |k: usize| (placed(world.find(&format!("pin {k}")).unwrap()).y - cuts[k]).abs();
@@ -143,10 +144,11 @@ fn turn(cuts: [f64; 5]) -> (f64, f64) {
         world.apply_torque(key, 0, -Vec3::z()).unwrap();
         turns.of(world, plug);
         overlap[1] = overlap[1].max(world.report().max_penetration);
+        unconverged[1] += u32::from(world.report().unconverged > 0);
     });
     println!(
-        "lock, {triangles} triangles in housing and plug: key and pins {worst:.1e} m from their places, the plug turns by {:.4} rad, overlap {:.1e} m while the key goes in and {:.1e} m while it turns, real-time factor {in_time:.2} and {turning:.2}",
-        turns.total, overlap[0], overlap[1]
+        "lock, {triangles} triangles in housing and plug: key and pins {worst:.1e} m from their places, the plug turns by {:.4} rad, overlap {:.1e} m while the key goes in and {:.1e} m while it turns, {} of 360 and {} of 240 steps unconverged, real-time factor {in_time:.2} and {turning:.2}",
+        turns.total, overlap[0], overlap[1], unconverged[0], unconverged[1]
     );
     assert!(overlap[0].max(overlap[1]) < 2e-4, "{overlap:?}");
     (worst, turns.total)
