@@ -42,9 +42,9 @@ pub use caption::caption;
 pub use draw::{DebugDraw, Drawing, NamedView, UnknownOverlay, UnknownView, UpAxis, tree_over_mesh};
 pub use error::RenderError;
 pub use facet::{
-    Blend, CalibrationPattern, CaveView, ColorTable, FacetView, Pfm, PortableEye, PortableFacet, PortableFinish,
-    PortableNumbers, PortablePass, ProjectorColor, RIM_PX, ScreenMesh, Tile, Warp, as_projected, calibration_picture,
-    finished_calibration_picture, unfold,
+    Blend, CalibrationPattern, CaveView, ColorTable, FacetView, NumberFormat, Pfm, PortableEye, PortableFacet,
+    PortableFinish, PortableNumbers, PortablePass, ProjectorColor, RIM_PX, ScreenMesh, Tile, Warp, as_projected,
+    calibration_picture, finished_calibration_picture, unfold,
 };
 pub use gpu::{
     FreeParticle, FreeParticles, GlslProgram, GlslTranslator, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle,

@@ -33,7 +33,7 @@ pub(crate) use compose::{Parity, blank};
 pub use lut::ColorTable;
 pub use perspective::FacetView;
 pub use pfm::Pfm;
-pub use portable::{PortableEye, PortableFacet, PortableFinish, PortableNumbers, PortablePass};
+pub use portable::{NumberFormat, PortableEye, PortableFacet, PortableFinish, PortableNumbers, PortablePass};
 pub use surface::ScreenMesh;
 pub use unfold::{Tile, unfold};
 pub use view::{CaveView, RIM_PX};

@@ -56,13 +56,24 @@ pub struct PortablePass {
 #[derive(Clone, Debug)]
 pub struct PortableFinish(pub(crate) Arc<Finish>);
 
+/// Format of a pixel of [`PortableNumbers`]: how many floats of which size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NumberFormat {
+    /// Two of 32 bits.
+    Rg32Float,
+    /// Four of 32 bits.
+    Rgba32Float,
+    /// Four of 16 bits.
+    Rgba16Float,
+}
+
 /// Numbers for each pixel, as a texture that is read without a filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PortableNumbers {
     /// Width and height, pixels.
     pub size_px: [u32; 2],
-    /// Format in the words of WebGPU: `rg32float`, `rgba32float` or `rgba16float`.
-    pub format: &'static str,
+    /// Format of a pixel.
+    pub format: NumberFormat,
     /// Rows from the top, little endian.
     pub bytes: Vec<u8>,
 }

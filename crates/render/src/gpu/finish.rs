@@ -12,7 +12,7 @@ use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
 use super::targets::{Targets, finished_texture};
 use crate::RenderError;
-use crate::facet::{Parity, PortableNumbers, ProjectorColor};
+use crate::facet::{NumberFormat, Parity, PortableNumbers, ProjectorColor};
 use std::sync::Arc;
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
@@ -58,19 +58,19 @@ impl Finish {
             Bend::None => None,
             Bend::Warp(warp) => {
                 let places: Vec<f32> = warp.iter().flat_map(|from| from.unwrap_or([NOWHERE; 2])).collect();
-                Some(floats("rg32float", self.size, &places))
+                Some(floats(NumberFormat::Rg32Float, self.size, &places))
             }
-            Bend::Surface(shown) => Some(floats("rgba32float", self.size, shown.as_flattened())),
+            Bend::Surface(shown) => Some(floats(NumberFormat::Rgba32Float, self.size, shown.as_flattened())),
         };
         let shares = self.shares.as_ref().map(|shares| PortableNumbers {
             size_px: self.size,
-            format: "rgba16float",
+            format: NumberFormat::Rgba16Float,
             bytes: shares.iter().flatten().flat_map(|share| half(*share).to_le_bytes()).collect(),
         });
         let table = self.color.as_ref().and_then(|color| color.table.as_ref()).map(|table| {
             let (n, colors) = table.nodes();
             let nodes: Vec<f32> = colors.iter().flat_map(|[r, g, b]| [*r, *g, *b, 1.0]).collect();
-            floats("rgba32float", [n, n * n], &nodes)
+            floats(NumberFormat::Rgba32Float, [n, n * n], &nodes)
         });
         [bend, shares, table]
     }
@@ -297,9 +297,9 @@ impl Finisher {
         for (view, numbers) in views.iter_mut().zip(finish.textures()) {
             let Some(PortableNumbers { size_px, format, bytes }) = numbers else { continue };
             let format = match format {
-                "rg32float" => TextureFormat::Rg32Float,
-                "rgba16float" => TextureFormat::Rgba16Float,
-                _ => TextureFormat::Rgba32Float,
+                NumberFormat::Rg32Float => TextureFormat::Rg32Float,
+                NumberFormat::Rgba16Float => TextureFormat::Rgba16Float,
+                NumberFormat::Rgba32Float => TextureFormat::Rgba32Float,
             };
             *view = upload(gpu, size_px, format, &bytes);
         }

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble::net::browser::Backend;
 use tumble::render::{
-    GlslProgram, GlslTranslator, Image, MeshData, PortableDraw, PortableFacet, PortableFinish, PortableItems,
-    PortableKey, PortablePicture, Recipe, portable_pass_wgsl, portable_wgsl,
+    GlslProgram, GlslTranslator, Image, MeshData, NumberFormat, PortableDraw, PortableFacet, PortableFinish,
+    PortableItems, PortableKey, PortablePicture, Recipe, portable_pass_wgsl, portable_wgsl,
 };
 
 /// Maximum length of a message, bytes: what a browser can be expected to hold.
@@ -40,9 +40,6 @@ const SHADOW_VIEW: u32 = 10;
 /// Numbers of the first array of a view after the first one, and of the first uniform block of a pass.
 const FIRST_OF_VIEWS: u32 = 256;
 const FIRST_OF_PASSES: u32 = 1024;
-
-/// Formats of textures of numbers, by the number that is sent.
-const FORMATS: [&str; 3] = ["rg32float", "rgba32float", "rgba16float"];
 
 /// Data that a browser has, so that only changes are sent.
 pub struct Encoder {
@@ -186,7 +183,11 @@ impl Encoder {
             self.finishes.push(finish.clone());
             for (texture, id) in finish.textures().iter().zip(first..) {
                 let Some(texture) = texture else { continue };
-                let format = FORMATS.iter().position(|format| *format == texture.format).unwrap_or(0) as u32;
+                let format = match texture.format {
+                    NumberFormat::Rg32Float => 0,
+                    NumberFormat::Rgba32Float => 1,
+                    NumberFormat::Rgba16Float => 2,
+                };
                 let words = texture.bytes.as_chunks::<4>().0.iter().map(|&word| u32::from_le_bytes(word));
                 let [width, height] = texture.size_px;
                 out.push(NUMBERS, [id, format, width, height].into_iter().chain(words));
