@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 use tumble_render::{
-    CaveView, DrawList, GlslTranslator, Ground, Light, Material, MeshData, PortableItems, PortablePicture, Quality,
-    SoftSphere,
+    CaveView, DrawList, GlslTranslator, Ground, Light, Material, MeshData, NumberFormat, PortableItems,
+    PortablePicture, Quality, SoftSphere,
 };
 use tumble_scene::SceneFile;
 use tumble_scene::cave::{Facet, Stereo, resolve_cave};
@@ -107,7 +107,10 @@ fn a_facet_has_views_and_a_pass_for_each_eye() {
         let finish = pass.finish.as_ref().unwrap();
         let [shown, shares, table] = finish.textures();
         let shown = shown.unwrap();
-        assert_eq!((shown.size_px, shown.format, shown.bytes.len()), ([96, 96], "rgba32float", 96 * 96 * 16));
+        assert_eq!(
+            (shown.size_px, shown.format, shown.bytes.len()),
+            ([96, 96], NumberFormat::Rgba32Float, 96 * 96 * 16)
+        );
         assert!(shares.is_none() && table.is_none() && finish.used() == [true, false, false]);
         assert!(finish.is_same(dome.eyes[0].pass.finish.as_ref().unwrap()));
     }
