@@ -137,13 +137,13 @@ impl LoopJointRecord {
             Anchor { part, frame }
         });
         let mut joint = LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)?;
+        joint.set_transmission(self.transmission).map_err(damaged)?;
         if self.kind.has_length() {
             joint.set_length(self.length).map_err(damaged)?;
         }
         joint.set_dof(self.dof).map_err(damaged)?;
         let [force, torque] = self.breaking;
         joint.set_breaking(force, torque).map_err(damaged)?;
-        joint.set_transmission(self.transmission).map_err(damaged)?;
         Ok(joint)
     }
 }

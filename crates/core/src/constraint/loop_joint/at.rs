@@ -108,12 +108,10 @@ impl LoopJoint {
         }
         let joint = LoopJoint::new(name, kind, sides[0], sides[1])?;
         let mut joint = joint.with_transmission(|t| (t.references, t.ground) = (frames, ground))?;
-        match kind {
-            LoopJointKind::Pulley => {
-                joint.set_length((points[0] - ground[0]).norm() + (points[1] - ground[1]).norm())?
-            }
-            _ if kind.has_length() => joint.set_length((points[0] - points[1]).norm())?,
-            _ => {}
+        if kind == LoopJointKind::Pulley {
+            joint.set_length(joint.transmission().rope_length())?;
+        } else if kind.has_length() {
+            joint.set_length((points[0] - points[1]).norm())?;
         }
         Ok(joint)
     }

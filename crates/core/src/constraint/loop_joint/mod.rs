@@ -159,13 +159,17 @@ impl LoopJoint {
         })
     }
 
-    /// Sets the constants of a gear, a rack, a screw or a pulley.
+    /// Sets the constants of a gear, a rack, a screw or a pulley. The length of a pulley that was made
+    /// without one follows them: its rope is taut in the poses in which it was made.
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a constant out of its range.
     pub fn set_transmission(&mut self, transmission: Transmission) -> Result<(), LoopJointError> {
         if let Some((what, value, expected)) = transmission.range_error() {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
+        }
+        if self.kind == LoopJointKind::Pulley && self.length == self.transmission.rope_length() {
+            self.length = transmission.rope_length();
         }
         self.transmission = transmission;
         Ok(())

@@ -16,7 +16,8 @@ pub struct Transmission {
     pub ratio: f64,
     /// Points of the world over which the rope of a pulley runs, m.
     pub ground: [Vec3; 2],
-    /// Frames of A and B in the world at which gears and racks have position 0.
+    /// Frames of A and B in the world at which gears and racks have position 0, and a pulley has the length that it
+    /// gets by default.
     pub references: [Pose; 2],
 }
 
@@ -34,6 +35,12 @@ impl Default for Transmission {
 }
 
 impl Transmission {
+    /// Returns the length of a pulley's rope at the frames of reference, m.
+    pub(super) fn rope_length(&self) -> f64 {
+        let [a, b] = [0, 1].map(|k| (self.references[k].translation.vector - self.ground[k]).norm());
+        a + self.ratio * b
+    }
+
     /// Returns the first constant out of its range: name, value, admissible range.
     pub(super) fn range_error(&self) -> Option<(&'static str, f64, &'static str)> {
         let not_zero =
