@@ -8,7 +8,7 @@ use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 #[derive(Clone, Debug)]
 pub struct Collider {
     /// Pose of the shape in the frame of its link; for a mesh, the pose of its file's frame.
-    /// [`add_collider`](ArticulatedBody::add_collider) replaces it by the pose of the part's frame
+    /// [`add_collider`](super::ArticulatedBody::add_collider) replaces it by the pose of the part's frame
     /// in the frame of the moving link; for a mesh that frame is at the center of mass.
     pub pose: Pose,
     /// Geometry.
