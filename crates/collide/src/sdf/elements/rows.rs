@@ -50,18 +50,16 @@ pub(super) fn rows(edges: &mut [Edge], vertices: usize) -> Vec<Row> {
         }
         let (start, mut length) = (edges[e as usize].ends[end], 0.0);
         let along = (edges[e as usize].ends[1 - end] - start) / edges[e as usize].length;
-        let (row, mut count) = (rows.len() as u32, 0);
-        let mut at = Some((e, end));
-        let mut members = Vec::new();
+        let (row, mut at, mut count) = (rows.len() as u32, Some((e, end)), 0);
         while let Some((e, end)) = at {
             let edge = &mut edges[e as usize];
             (edge.row, edge.places[end], edge.places[1 - end]) = (row, length, length + edge.length);
             length += edge.length;
-            (count, _) = (count + 1, members.push(e));
+            count += 1;
             at = next(edges, e, 1 - end).filter(|(other, _)| edges[*other as usize].row == NO_ROW);
         }
         match count {
-            1 => members.iter().for_each(|e| edges[*e as usize].row = NO_ROW),
+            1 => edges[e as usize].row = NO_ROW,
             _ => rows.push(Row { start, along, length }),
         }
     }
