@@ -211,7 +211,7 @@ pub enum MeshError {
     /// Edges with a face on one side only.
     #[error(
         "the mesh is open: {edges} edges have a face on one side only, in {holes} hole(s); the first hole has {first_hole} edges and \
-             begins at edge {from}–{to} of face {face}; close it"
+             begins at edge {from}–{to} of face {face}; close it, or use an open mesh"
     )]
     Open {
         /// Number of such edges.

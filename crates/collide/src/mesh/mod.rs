@@ -22,6 +22,7 @@ mod stl;
 mod strip;
 mod terrain;
 mod text;
+mod thicken;
 mod triangle;
 mod union;
 mod winding;

@@ -7,12 +7,19 @@
 //! that are connected by pairs form fans. At an open fan exactly one boundary edge enters and one
 //! leaves, so the boundary edges form unique loops.
 
-use super::TriMesh;
-use super::edges::{HalfEdge, edge_groups};
-use crate::UnionFind;
+use super::edges::{EdgeGroups, HalfEdge, edge_groups};
+use super::{TriMesh, face_normals};
+use crate::{UnionFind, Vec3};
 
 /// Marks a half-edge without partner.
 pub(super) const BOUNDARY: u32 = u32::MAX;
+/// Faces whose normals have a smaller cosine are folded onto each other.
+const FOLDED: f64 = -0.999;
+/// Further faces at one edge stay unpaired, since all pairs are compared.
+const MAX_AT_AN_EDGE: usize = 256;
+
+/// Receives two half-edges that are paired.
+type Join<'a> = dyn FnMut(&HalfEdge, &HalfEdge) + 'a;
 
 /// The pairing. Half-edge `3t + k` belongs to edge `k` (corners k to k+1) of triangle `t`.
 pub(super) struct Pairing {
@@ -35,13 +42,26 @@ impl Pairing {
             let [a, b, c] = mesh.corners(t);
             area[sheet[t] as usize] += (b - a).cross(&(c - a)).norm();
         }
+        let pair = |group: &[HalfEdge], join: &mut Join<'_>| pair_group(group, &sheet, &area, join);
+        Pairing::by(mesh, &groups, pair)
+    }
+
+    /// Pairs the half-edges of an edge whose faces continue each other most straight. Faces that are folded
+    /// onto each other are not paired.
+    pub fn flattest(mesh: &TriMesh) -> Pairing {
+        let normals = face_normals(mesh);
+        Pairing::by(mesh, &edge_groups(mesh), |group, join| pair_flattest(group, &normals, join))
+    }
+
+    fn by(mesh: &TriMesh, groups: &EdgeGroups, pair: impl Fn(&[HalfEdge], &mut Join<'_>)) -> Pairing {
+        let faces = mesh.triangles.len();
         let mut partner = vec![BOUNDARY; 3 * faces];
         let mut join = |a: &HalfEdge, b: &HalfEdge| {
             let (a, b) = (half_edge_index(mesh, a), half_edge_index(mesh, b));
             (partner[a], partner[b]) = (b as u32, a as u32);
         };
         for group in groups.iter() {
-            pair_group(group, &sheet, &area, &mut join);
+            pair(group, &mut join);
         }
         let over_pairs = (0..3 * faces).filter(|&u| partner[u] != BOUNDARY).map(|u| (u / 3, partner[u] as usize / 3));
         let (piece, pieces) = components(faces, over_pairs);
@@ -52,6 +72,16 @@ impl Pairing {
             }
         }
         Pairing { partner, piece, pieces, dangling }
+    }
+
+    /// Returns the fan of each corner `3t + k`, and the number of fans: corners at one vertex whose faces
+    /// are connected by pairs.
+    pub fn fans(&self) -> (Vec<u32>, usize) {
+        let next_of = |u: usize| u / 3 * 3 + (u % 3 + 1) % 3;
+        // the end of a half-edge is the start of its partner
+        let meet = |u: usize, v: usize| [(u, next_of(v)), (next_of(u), v)];
+        let pairs = (0..self.partner.len()).filter(|&u| self.partner[u] != BOUNDARY);
+        components(self.partner.len(), pairs.flat_map(|u| meet(u, self.partner[u] as usize)))
     }
 
     /// Returns whether each piece has a boundary.
@@ -109,7 +139,7 @@ fn opposite(group: &[HalfEdge]) -> bool {
 }
 
 /// Pairs the half-edges of one edge.
-fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut impl FnMut(&HalfEdge, &HalfEdge)) {
+fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut Join<'_>) {
     let mut left: Vec<&HalfEdge> = group.iter().collect();
     let size = |u: &HalfEdge| area[sheet[u.face] as usize];
     left.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.face.cmp(&b.face)));
@@ -127,6 +157,20 @@ fn pair_group(group: &[HalfEdge], sheet: &[u32], area: &[f64], join: &mut impl F
                 None => n += 1,
             }
         }
+    }
+}
+
+/// Pairs the half-edges of one edge, the flattest pairs first.
+fn pair_flattest(group: &[HalfEdge], normals: &[Vec3], join: &mut Join<'_>) {
+    let (forward, backward): (Vec<&HalfEdge>, Vec<&HalfEdge>) =
+        group.iter().take(MAX_AT_AN_EDGE).partition(|u| u.forward);
+    let cosine = |a: &HalfEdge, b: &HalfEdge| normals[a.face].dot(&normals[b.face]);
+    let mut pairs: Vec<(&HalfEdge, &HalfEdge)> =
+        forward.iter().flat_map(|a| backward.iter().map(|b| (*a, *b))).filter(|(a, b)| cosine(a, b) > FOLDED).collect();
+    pairs.sort_by(|p, q| cosine(q.0, q.1).total_cmp(&cosine(p.0, p.1)).then((p.0, p.1).cmp(&(q.0, q.1))));
+    while let Some(&(a, b)) = pairs.first() {
+        join(a, b);
+        pairs.retain(|(c, d)| *c != a && *d != b);
     }
 }
 

@@ -98,12 +98,24 @@ impl RayMesh {
     /// Returns the first triangle whose front the ray meets within `max` meters; of several at one
     /// distance, the first of the mesh. `direction` is a unit vector.
     pub fn cast(&self, origin: &Vec3, direction: &Vec3, max: f64) -> Option<TriangleHit> {
+        self.first(origin, direction, max, |_, _, front| front)
+    }
+
+    /// As [`cast`](Self::cast), for the hits that `counts` accepts by triangle, distance, and whether the front is hit.
+    pub fn first(
+        &self,
+        origin: &Vec3,
+        direction: &Vec3,
+        max: f64,
+        counts: impl Fn(u32, f64, bool) -> bool,
+    ) -> Option<TriangleHit> {
         let ray = ShearedRay::new(origin, direction);
         let (mut limit, mut hit) = (max, None::<TriangleHit>);
         self.tree.visit_along(origin, direction, &mut limit, |slot, limit| {
-            let Some((distance, true)) = ray.meet(&self.corners[slot]) else { return };
+            let Some((distance, front)) = ray.meet(&self.corners[slot]) else { return };
             let triangle = self.tree.order()[slot];
-            if distance < *limit || distance == *limit && hit.is_none_or(|hit| triangle < hit.triangle) {
+            let first = distance < *limit || distance == *limit && hit.is_none_or(|hit| triangle < hit.triangle);
+            if first && counts(triangle, distance, front) {
                 (*limit, hit) = (distance, Some(TriangleHit { distance, triangle }));
             }
         });

@@ -231,6 +231,16 @@ impl Shape {
         Shape::mesh(surface.terrain(thickness)?, &TreeSettings::octree())
     }
 
+    /// Returns an open surface of any form (rooms, walls, tunnels) as a solid that reaches `thickness` meters
+    /// behind its faces (`None`: a hundredth of its diagonal), or half as far to both sides if `centered`, as a
+    /// mesh ([`TriMesh::thickened`]).
+    ///
+    /// # Errors
+    /// [`ShapeError::Mesh`]: wrong data, faces without area, or a thickness that is not above 0.
+    pub fn open_mesh(surface: &TriMesh, thickness: Option<f64>, centered: bool) -> Result<Shape, ShapeError> {
+        Shape::mesh(surface.thickened(thickness, centered)?, &TreeSettings::octree())
+    }
+
     /// Returns the solid in which a signed distance is negative, as a mesh of its surface
     /// ([`TriMesh::isosurface`]): within the box from `low` to `high` (m), `cells` along the longest side.
     /// Mass properties are those of the mesh.

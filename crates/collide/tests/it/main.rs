@@ -19,6 +19,7 @@ mod medial;
 mod mesh_contacts;
 mod mesh_files;
 mod meshes;
+mod open_mesh;
 mod overlaps;
 mod pairs;
 mod primitives;

@@ -32,6 +32,10 @@ enum Floor {
     Terrain {
         cells: usize,
     },
+    /// The same, as an open mesh.
+    OpenMesh {
+        cells: usize,
+    },
     /// Rows of flush boxes: along x, and along y, meters.
     Boxes {
         size: [f64; 2],
@@ -155,11 +159,15 @@ impl Floor {
             Floor::HeightField { count, .. } => {
                 Some(Shape::height_field(&vec![0.0; count * count], count, [FLOOR; 2], Some(0.2)).unwrap())
             }
-            Floor::Terrain { cells } => {
+            Floor::Terrain { cells } | Floor::OpenMesh { cells } => {
                 let slab = slab(cells, 0.6);
                 let top = |t: &&[u32; 3]| t.iter().all(|v| slab.vertices[*v as usize].z > 0.0);
                 let triangles = slab.triangles.iter().filter(top).copied().collect();
-                Some(Shape::terrain(&TriMesh { vertices: slab.vertices, triangles }, Some(0.2)).unwrap())
+                let top = TriMesh { vertices: slab.vertices, triangles };
+                Some(match self {
+                    Floor::Terrain { .. } => Shape::terrain(&top, Some(0.2)).unwrap(),
+                    _ => Shape::open_mesh(&top, Some(0.2), false).unwrap(),
+                })
             }
             Floor::HalfSpace | Floor::Boxes { .. } => None,
         }
@@ -174,7 +182,7 @@ impl Floor {
         };
         match self {
             Floor::HalfSpace => add_body("floor", Shape::half_space(), Pose::identity()),
-            Floor::Slab { .. } | Floor::HeightField { .. } | Floor::Terrain { .. } => {
+            Floor::Slab { .. } | Floor::HeightField { .. } | Floor::Terrain { .. } | Floor::OpenMesh { .. } => {
                 let (yaw, z) = match self {
                     Floor::Slab { yaw, .. } => (yaw, -0.1),
                     Floor::HeightField { yaw, .. } => (yaw, 0.0),
@@ -313,11 +321,12 @@ fn a_flat_mesh_acts_like_a_half_space_full_length() {
 }
 
 #[test]
-fn a_flat_height_field_and_a_flat_terrain_act_like_a_half_space_full_length() {
+fn flat_height_fields_terrain_and_open_meshes_act_like_a_half_space_full_length() {
     let floors = [
         Floor::HeightField { count: 64, yaw: 0.0 },
         Floor::HeightField { count: 101, yaw: 0.4 },
         Floor::Terrain { cells: 50 },
+        Floor::OpenMesh { cells: 31 },
     ];
     acts_like_a_half_space(if slow() { &floors } else { &floors[1..] }, 1e-6, |_, _| true);
 }

@@ -59,6 +59,7 @@ mod meshes;
 mod mimic;
 mod moving_contact;
 mod one_way;
+mod open_mesh;
 mod overlaps;
 mod pair_materials;
 mod paradox;
