@@ -72,7 +72,7 @@ mod _native {
     #[pymodule_export]
     use super::objects::spheretree::{_unpickle_tree, SphereTree};
     #[pymodule_export]
-    use super::objects::terrain::{ConvexHull, HeightField, Sdf, Terrain};
+    use super::objects::terrain::{ConvexHull, HeightField, OpenMesh, Sdf, Terrain};
     #[pymodule_export]
     use super::script::action::Action;
     #[pymodule_export]

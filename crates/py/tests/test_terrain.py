@@ -112,6 +112,7 @@ def test_pickles_keep_the_class_and_worlds_keep_the_motion():
         tumble.ConvexHull(rng.normal(size=(30, 3))),
         tumble.HeightField(rng.uniform(0, 0.3, (8, 9)), (3, 3)),
         tumble.Terrain([[0, 0, 0], [1, 0, 0], [0, 1, 0.2]], [[0, 1, 2]]),
+        tumble.OpenMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0.2]], [[0, 1, 2]], centered=True),
     ]
     for shape in shapes:
         again = pickle.loads(pickle.dumps(shape))
@@ -128,6 +129,20 @@ def test_pickles_keep_the_class_and_worlds_keep_the_motion():
     assert np.array_equal(world.state, other.state)
 
 
+def test_an_open_mesh_reaches_behind_its_faces_or_to_both_sides(tmp_path):
+    corners = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]
+    up, down = [[0, 1, 2], [0, 2, 3]], [[0, 2, 1], [0, 3, 2]]
+    for faces, options, top in [(up, {}, 0), (down, {}, 0.2), (up, {"centered": True}, 0.1)]:
+        sheet = tumble.OpenMesh(corners, faces, 0.2, **options)
+        assert isinstance(sheet, tumble.Mesh)
+        assert sheet.volume == pytest.approx(0.4)
+        assert surface(sheet, 0.3, 0.4) == pytest.approx(top, abs=1e-12)
+    file = tmp_path / "wall.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
+    assert tumble.OpenMesh(file, thickness=0.1, scale=2.0).volume == pytest.approx(0.2)
+    assert repr(tumble.OpenMesh(str(file))) == "OpenMesh(1 triangles)"
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -142,6 +157,9 @@ def test_pickles_keep_the_class_and_worlds_keep_the_motion():
         (lambda: tumble.HeightField(np.zeros((2, 2)), (1, 0)), "a size y of 0 m"),
         (lambda: tumble.HeightField(np.zeros((2, 2)), (1, 1), thickness=-2), "a thickness of -2 m"),
         (lambda: tumble.HeightField("no such file.png", (1, 1)), "no such file.png"),
+        (lambda: tumble.OpenMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), "none of the 1 triangles has an area"),
+        (lambda: tumble.OpenMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], thickness=-1), "the thickness is -1 m"),
+        (lambda: tumble.OpenMesh("no such file.obj"), "no such file.obj"),
         (lambda: tumble.Terrain([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 1, 2]]), r"face 1 is turned by 90.0°"),
         (lambda: tumble.Terrain([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], thickness=0.0), "the thickness is 0 m"),
     ],

@@ -49,6 +49,7 @@ __all__ = [
     "LinearizedStep",
     "Mesh",
     "Mimic",
+    "OpenMesh",
     "Panel",
     "ParticleSystem",
     "Policy",
@@ -89,7 +90,7 @@ __all__ = [
 @disjoint_base
 class Shape:
     """A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``Ellipsoid``,
-    ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound``
+    ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain``, ``OpenMesh`` and ``Compound``
     make one.
     """
     @property
@@ -235,6 +236,23 @@ class Terrain(Mesh):
         *,
         scale: float = 1.0,
     ) -> Terrain: ...
+
+@final
+class OpenMesh(Mesh):
+    """The solid behind an open surface of any form, a ``Mesh``; for static bodies: rooms, walls, tunnels. Takes what
+    ``Mesh`` takes; faces look to the free side, counter-clockwise seen from there. thickness: distance that the
+    solid reaches behind them, meters; None: a hundredth of the diagonal. centered: whether it reaches half as far
+    to both sides instead.
+    """
+    def __new__(
+        cls,
+        vertices: Any,
+        faces: ArrayLike | None = None,
+        thickness: float | None = None,
+        *,
+        centered: bool = False,
+        scale: float = 1.0,
+    ) -> OpenMesh: ...
 
 @final
 class Sdf(Mesh):

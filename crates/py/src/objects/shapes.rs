@@ -15,7 +15,7 @@ use tumble::collide::{CompoundPart, Pose, Quat, Shape as Solid, TreeCache, TreeS
 use tumble::scene::{building_surface, read_solid};
 
 /// A collision shape. The classes ``Sphere``, ``Box``, ``Capsule``, ``Cylinder``, ``Ellipsoid``,
-/// ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain`` and ``Compound``
+/// ``Cone``, ``HalfSpace``, ``Mesh``, ``ConvexHull``, ``HeightField``, ``Terrain``, ``OpenMesh`` and ``Compound``
 /// make one.
 #[pyclass(frozen, subclass, module = "tumble")]
 pub struct Shape {

@@ -24,6 +24,7 @@ pub(super) fn mesh_of_record(py: Python<'_>, shape: Shape) -> Result<Py<PyAny>> 
         "ConvexHull" => Py::new(py, shape.into_mesh(ConvexHull))?.into_any(),
         "HeightField" => Py::new(py, shape.into_mesh(HeightField))?.into_any(),
         "Terrain" => Py::new(py, shape.into_mesh(Terrain))?.into_any(),
+        "OpenMesh" => Py::new(py, shape.into_mesh(OpenMesh))?.into_any(),
         "Sdf" => Py::new(py, shape.into_mesh(Sdf))?.into_any(),
         _ => Py::new(py, shape.into_a(Mesh))?.into_any(),
     })
@@ -146,18 +147,55 @@ impl Terrain {
         thickness: Option<f64>,
         scale: f64,
     ) -> Result<PyClassInitializer<Terrain>> {
-        let scale = checked_scale(scale)?;
-        let (mesh, place) = match given(vertices, faces)? {
-            Some(mesh) => (mesh, String::new()),
-            None => {
-                let file = path(vertices)?;
-                (read_open(py, &file)?, format!("{}: ", file.display()))
-            }
-        };
+        let (mesh, place) = open_surface(py, vertices, faces, scale)?;
         let count = mesh.triangles.len();
-        let solid = mesh.scaled(scale).terrain(thickness).map_err(|e| Error::value(format!("{place}{e}")))?;
+        let solid = mesh.terrain(thickness).map_err(|e| Error::value(format!("{place}{e}")))?;
         Ok(Shape::new(built(py, "Terrain", solid)?, format!("Terrain({count} triangles)")).into_mesh(Terrain))
     }
+}
+
+/// The solid behind an open surface of any form, a ``Mesh``; for static bodies: rooms, walls, tunnels. Takes what
+/// ``Mesh`` takes; faces look to the free side, counter-clockwise seen from there. thickness: distance that the
+/// solid reaches behind them, meters; None: a hundredth of the diagonal. centered: whether it reaches half as far
+/// to both sides instead.
+#[pyclass(frozen, extends = Mesh, module = "tumble")]
+pub struct OpenMesh;
+
+#[pymethods]
+impl OpenMesh {
+    #[new]
+    #[pyo3(signature = (vertices, faces=None, thickness=None, *, centered=false, scale=1.0))]
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        faces: Option<&Bound<'_, PyAny>>,
+        thickness: Option<f64>,
+        centered: bool,
+        scale: f64,
+    ) -> Result<PyClassInitializer<OpenMesh>> {
+        let (mesh, place) = open_surface(py, vertices, faces, scale)?;
+        let count = mesh.triangles.len();
+        let solid = mesh.thickened(thickness, centered).map_err(|e| Error::value(format!("{place}{e}")))?;
+        Ok(Shape::new(built(py, "OpenMesh", solid)?, format!("OpenMesh({count} triangles)")).into_mesh(OpenMesh))
+    }
+}
+
+/// Returns a surface that need not be closed, and what errors begin with.
+fn open_surface(
+    py: Python<'_>,
+    vertices: &Bound<'_, PyAny>,
+    faces: Option<&Bound<'_, PyAny>>,
+    scale: f64,
+) -> Result<(TriMesh, String)> {
+    let scale = checked_scale(scale)?;
+    let (mesh, place) = match given(vertices, faces)? {
+        Some(mesh) => (mesh, String::new()),
+        None => {
+            let file = path(vertices)?;
+            (read_open(py, &file)?, format!("{}: ", file.display()))
+        }
+    };
+    Ok((mesh.scaled(scale), place))
 }
 
 /// The solid in which signed distances on a grid are negative, a ``Mesh`` of the surface by marching tetrahedra.

@@ -94,6 +94,11 @@ impl SceneFile {
                 let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
                 mesh.scaled(*scale).terrain(*thickness_m).map_err(|e| wrong(e.at_line(&lines).to_string()))?
             }
+            MeshSource::OpenMesh { path, scale, thickness_m, centered } => {
+                let (mesh, lines) = self.read_mesh(spec, path, wrong)?;
+                let solid = mesh.scaled(*scale).thickened(*thickness_m, *centered);
+                solid.map_err(|e| wrong(e.at_line(&lines).to_string()))?
+            }
             MeshSource::Sdf { path, low_m, high_m } => {
                 let grid = read_grid(&self.read_bytes(spec, path, wrong)?);
                 let grid = grid.map_err(|why| wrong(format!("{}: {why}", path.display())))?;

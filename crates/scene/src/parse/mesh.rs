@@ -117,6 +117,17 @@ pub enum MeshSource {
         /// side.
         thickness_m: Option<f64>,
     },
+    /// The solid behind an open surface, in the frame of its file.
+    OpenMesh {
+        /// An OBJ, STL, PLY or COLLADA file, prefixed with the folder of the scene.
+        path: PathBuf,
+        /// Meters per unit of the file.
+        scale: f64,
+        /// Distance that the solid reaches behind the faces, meters; `None` for a hundredth of the diagonal.
+        thickness_m: Option<f64>,
+        /// Whether it reaches half as far to both sides instead.
+        centered: bool,
+    },
     /// The solid in which signed distances on a grid are negative, in the frame of the grid.
     Sdf {
         /// A NumPy file of three axes, prefixed with the folder of the scene.
@@ -142,6 +153,7 @@ enum Kind {
     ConvexHull,
     HeightField,
     Terrain,
+    OpenMesh,
     Sdf,
 }
 
@@ -156,6 +168,7 @@ const KINDS: Names<Kind> = &[
     ("convex_hull", Kind::ConvexHull),
     ("height_field", Kind::HeightField),
     ("terrain", Kind::Terrain),
+    ("open_mesh", Kind::OpenMesh),
     ("sdf", Kind::Sdf),
 ];
 
@@ -189,6 +202,7 @@ impl MeshSource {
         match self {
             MeshSource::File { path, .. }
             | MeshSource::Terrain { path, .. }
+            | MeshSource::OpenMesh { path, .. }
             | MeshSource::Sdf { path, .. }
             | MeshSource::ConvexHull(HullPoints::File { path, .. })
             | MeshSource::HeightField { heights: Heights::File { path, .. }, .. } => Some(path),
@@ -229,6 +243,7 @@ impl MeshSource {
             Kind::ConvexHull => terrain::read_hull(f, folder)?,
             Kind::HeightField => terrain::read_height_field(f, folder)?,
             Kind::Terrain => terrain::read_terrain(f, folder)?,
+            Kind::OpenMesh => terrain::read_open_mesh(f, folder)?,
             Kind::Sdf => {
                 let [low_m, high_m] = ["low_m", "high_m"].map(|key| f.vector(key, Bound::ANY));
                 let path = read_file(f, folder, &["npy"], "the path of an .npy file")?;

@@ -113,6 +113,14 @@ pub(super) fn read_terrain(f: &mut Fields<'_>, folder: &Path) -> Option<MeshSour
     Some(MeshSource::Terrain { path: read_path(f, folder)?, scale, thickness_m })
 }
 
+/// Reads `type = "open_mesh"`.
+pub(super) fn read_open_mesh(f: &mut Fields<'_>, folder: &Path) -> Option<MeshSource> {
+    let scale = f.number_or("scale", Bound::POSITIVE, 1.0);
+    let thickness_m = f.optional_number("thickness_m", Bound::POSITIVE);
+    let centered = f.flag_or("centered", false);
+    Some(MeshSource::OpenMesh { path: read_path(f, folder)?, scale, thickness_m, centered })
+}
+
 fn read_height_path(f: &mut Fields<'_>, folder: &Path) -> Option<PathBuf> {
     read_file(f, folder, &["png", "txt", "csv"], "the path of a .png, .txt or .csv file")
 }

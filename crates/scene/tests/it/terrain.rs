@@ -93,7 +93,8 @@ fn height_fields_of_lists_images_and_texts_have_their_heights() {
 
 #[test]
 fn hulls_terrain_and_planes_are_built() {
-    let folder = Folder::new("hulls", &[("roof.obj", ROOF)]);
+    let level = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 3 2\n";
+    let folder = Folder::new("hulls", &[("roof.obj", ROOF), ("level.obj", level)]);
     let points = "[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3], [0.1, 0.1, 0.1]]";
     let text = scene(&format!("type = \"convex_hull\"\npoints_m = {points}"));
     // the plane x + y + z/3 = 1
@@ -102,6 +103,11 @@ fn hulls_terrain_and_planes_are_built() {
     assert_eq!(world.ids().len(), 1);
     let text = scene("type = \"terrain\"\nfile = \"roof.obj\"\nscale = 2\nthickness_m = 0.1");
     assert!((folder.height(&text, 0.5, 0.0) - 1.0).abs() < 1e-9);
+    // faces that look down have their solid above them; a centered one has half on each side
+    for (keys, top) in [("", 1.0), ("\ncentered = true", 0.5)] {
+        let text = scene(&format!("type = \"open_mesh\"\nfile = \"level.obj\"\nthickness_m = 1{keys}"));
+        assert!((folder.height(&text, 0.5, 0.25) - top).abs() < 1e-9);
+    }
     // an open file has a hull if it is not flat
     let folder = Folder::new("open", &[("tent.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 3\nf 1 2 4\nf 2 3 4\n")]);
     let text = scene("type = \"convex_hull\"\nfile = \"tent.obj\"");
@@ -124,6 +130,7 @@ fn every_fault_is_one_message_with_its_place() {
     let files: &[(&str, &[u8])] = &[
         ("roof.obj", ROOF),
         ("wall.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 1\nf 1 2 3\nf 1 2 4\n"),
+        ("line.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
         ("color.png", &color),
         ("no.png", b"not a picture"),
         ("word.txt", b"0 1\n2 high\n"),
@@ -154,6 +161,10 @@ fn every_fault_is_one_message_with_its_place() {
         ("type = \"height_field\"\nheights_m = [[0, 1], [2, 3]]".into(), &["has no `size_m`"]),
         ("type = \"terrain\"\nfile = \"wall.obj\"".into(), &["wall.obj", "line 6: face 2", "90.0°"]),
         ("type = \"terrain\"\nfile = \"roof.obj\"\nthickness_m = -1".into(), &["scene.toml:4", "-1"]),
+        ("type = \"open_mesh\"".into(), &["has no `file`"]),
+        ("type = \"open_mesh\"\nfile = \"line.obj\"".into(), &["line.obj", "none of the 1 triangles has an area"]),
+        ("type = \"open_mesh\"\nfile = \"roof.obj\"\nthickness_m = 0".into(), &["scene.toml:4", "`thickness_m`"]),
+        ("type = \"open_mesh\"\nfile = \"roof.obj\"\ncentered = 1".into(), &["scene.toml:4", "`centered`"]),
     ] {
         let message = folder.fault(&scene(&mesh));
         for part in parts {
