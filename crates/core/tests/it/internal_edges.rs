@@ -408,3 +408,40 @@ fn a_ball_meets_the_face_behind_an_inner_edge_of_a_compound() {
         }
     }
 }
+
+/// Four corners on a plane are statically indeterminate: the load and its center are the same on tiles as on a
+/// half-space, and the shares of the corners need not be.
+#[test]
+fn tiles_carry_the_load_of_a_body_that_slides_and_turns_where_a_half_space_does() {
+    for mover in [Mover::Box, Mover::MeshBox, Mover::Puck] {
+        let run = |floor: Floor| {
+            let shape = floor.shape();
+            let mut world = world("time_stepping", 1.0 / 240.0);
+            floor.add_to(&mut world, &shape, 0.5);
+            let pose = Pose::from_parts(Vec3::new(0.013, 0.007, 0.1).into(), Quat::from_euler_angles(0.0, 0.0, 0.2));
+            let body = RigidBody::new(mover.shape())
+                .with_mass(1.0)
+                .with_material(Material { friction: 0.5, restitution: 0.0, ..Material::default() })
+                .with_pose(pose)
+                .with_velocity(Vec3::new(2.0, 0.0, 0.0))
+                .with_angular_velocity(Vec3::new(0.0, 0.0, 5.0));
+            world.add(body).unwrap();
+            world.step().unwrap();
+            let (mut load, mut moment) = (0.0, Vec3::zeros());
+            for contact in world.contacts() {
+                let normal = contact.impulse.z.abs();
+                load += normal;
+                moment += normal * contact.point;
+                let slip = contact.impulse.xy().norm();
+                assert!((slip - 0.5 * normal).abs() < 1e-9, "{mover:?}: friction {slip} of {normal}");
+            }
+            (load, moment / load)
+        };
+        let (load, center) = run(Floor::HalfSpace);
+        for kind in [Tile::Box, Tile::Hull, Tile::Mesh] {
+            let (found, at) = run(Floor::Boxes { size: [0.25, 0.25], kind });
+            assert!((found - load).abs() < 1e-9, "{mover:?} {kind:?}: load {found} instead of {load}");
+            assert!((at - center).norm() < 2e-4, "{mover:?} {kind:?}: at {at:?} instead of {center:?}");
+        }
+    }
+}
