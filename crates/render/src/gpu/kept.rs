@@ -146,6 +146,49 @@ fn with_kept_names(line: &str, part: Part) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Renderer;
+    use crate::gpu::Pipelines;
+
+    /// A picture with every kind of item, by shaders that read uniforms and by those with flat inputs.
+    #[test]
+    fn flat_inputs_change_no_bit_of_a_picture() {
+        let Ok(mut renderer) = Renderer::new() else { return };
+        if !renderer.gpu.flat_inputs {
+            return;
+        }
+        let scene = "[ground]\npattern = \"wood\"\n[[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius_m = 0.5 }\nposition_m = [0, 0, 0.5]\nmass_kg = 1\n\
+            [[body]]\nname = \"b\"\nshape = { type = \"box\", size_m = [0.5, 0.6, 0.7] }\nposition_m = [1, 0.5, 0.5]\nmass_kg = 1\n\
+            [[body]]\nname = \"c\"\nshape = { type = \"capsule\", radius_m = 0.2, length_m = 0.6 }\nposition_m = [-1, 0.2, 0.6]\nmass_kg = 1\n";
+        for lights in 0..=4 {
+            let light = |k: usize| {
+                format!(
+                    "[[light]]\ntype = \"point\"\nposition_m = [{k}, -1, 2]\nintensity = {}\n",
+                    1.0 + 0.3 * k as f64
+                )
+            };
+            let text: String = std::iter::once(scene.to_owned()).chain((0..lights).map(light)).collect();
+            let scene = tumble_scene::SceneFile::parse(&text, "flat.toml").unwrap();
+            let (world, _) = scene.build().unwrap();
+            let mut list = crate::Drawing::new(&scene).list(&world, &crate::DebugDraw::default()).unwrap();
+            list.soft_spheres.push(crate::SoftSphere {
+                center: nalgebra::Point3::new(0.3, -0.5, 0.8),
+                radius: 0.4,
+                color: [0.9, 0.4, 0.1],
+                opacity: 0.5,
+                shader: crate::Shader::Lit,
+            });
+            for quality in ["fastest", "fast", "default", "fastest,samples=4"] {
+                quality.parse::<crate::Quality>().unwrap().apply(&mut list.settings);
+                let pictures = [true, false].map(|flat| {
+                    renderer.pipelines = Pipelines::new(&renderer.gpu.device, true, flat);
+                    renderer.render(&list, 160, 120).unwrap()
+                });
+                assert!(pictures[0].rgba == pictures[1].rgba, "{lights} lights, {quality}");
+                let first = &pictures[0].rgba[..4];
+                assert!(pictures[0].rgba.chunks_exact(4).any(|pixel| pixel != first), "something is seen");
+            }
+        }
+    }
 
     #[test]
     fn every_mark_is_replaced_and_all_inputs_have_values() {

@@ -25,7 +25,7 @@
 
 use super::super::reduce::Collector;
 use super::hyperbola::Hyperbola;
-use super::line_parts::{Part, Shape};
+use super::line_parts::{Curvature, Part};
 use super::query::{Normals, Query};
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, MAX_PIECE, SLOPE_ROUNDING};
 use crate::sdf::elements::{Edge, max_slope};
@@ -127,11 +127,11 @@ impl Query<'_> {
     fn by_parts(&self, line: &Line, found: &mut Collector) {
         let mut last = None;
         let whole = Segment { start: line.start, along: line.along, from: 0.0, to: line.length };
-        for Part { from, to, shape } in self.parts_of(line.edge, &whole, line.normals, found.limit()) {
-            last = match shape {
-                Shape::Concave => None,
-                Shape::Convex => self.piece(line, (from, last), (to, None), found)[1],
-                Shape::Unknown => self.halve(line, (from, last), (to, None), found)[1],
+        for Part { from, to, curvature } in self.parts_of(line.edge, &whole, line.normals, found.limit()) {
+            last = match curvature {
+                Curvature::Concave => None,
+                Curvature::Convex => self.piece(line, (from, last), (to, None), found)[1],
+                Curvature::Unknown => self.halve(line, (from, last), (to, None), found)[1],
             };
         }
     }

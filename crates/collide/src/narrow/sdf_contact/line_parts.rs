@@ -27,7 +27,7 @@ use arrayvec::ArrayVec;
 
 /// How the distance changes on a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(super) enum Curvature {
     /// No minimum within `ρ`, except at the ends.
     Concave,
     /// At most one minimum within `ρ`.
@@ -41,7 +41,7 @@ pub(super) struct Part {
     /// Range of the distance from the start of the edge, meters.
     pub from: f64,
     pub to: f64,
-    pub shape: Shape,
+    pub curvature: Curvature,
 }
 
 /// Number of pieces of an edge, or of its row, above which its parts are looked for.
@@ -82,14 +82,14 @@ struct Plane<'a> {
 struct Range {
     from: f64,
     to: f64,
-    shape: Shape,
+    curvature: Curvature,
 }
 
 impl Query<'_> {
     /// Returns the parts of a line in the frame of the field: of an edge those of its row. `normals`
     /// are those of the edge, `reach` is `ρ`.
     pub(super) fn parts_of(&self, edge: Option<&Edge>, line: &Segment, normals: &[Vec3], reach: f64) -> Parts {
-        let unknown = || Parts::from_iter([Part { from: line.from, to: line.to, shape: Shape::Unknown }]);
+        let unknown = || Parts::from_iter([Part { from: line.from, to: line.to, curvature: Curvature::Unknown }]);
         let Some(edge) = edge.filter(|_| self.mesh.is_some()) else { return unknown() };
         let (smooth, least) = (edge.end_tolerance > 0.0, MAX_PIECE * self.size);
         let is_short = |length: f64| self.is_one_piece(length / MIN_PIECES, smooth);
@@ -113,7 +113,7 @@ impl Query<'_> {
     /// than `least` are joined to others. Returns one unknown part if nothing is known.
     fn parts(&self, edge: &Segment, normals: &[Vec3], reach: f64, least: f64) -> Parts {
         let mut parts = Parts::new();
-        let unknown = Part { from: edge.from, to: edge.to, shape: Shape::Unknown };
+        let unknown = Part { from: edge.from, to: edge.to, curvature: Curvature::Unknown };
         let known = self.mesh.filter(|_| reach > 0.0).is_some_and(|mesh| {
             let Some(planes) = self.planes(mesh, edge, normals, reach) else { return false };
             let ranges = self.ranges(&planes);
@@ -172,13 +172,13 @@ impl Query<'_> {
         let mut ranges = ArrayVec::new();
         for (k, a) in planes.iter().enumerate() {
             if !a.fits {
-                ranges.push(Range { from: a.from, to: a.to, shape: Shape::Unknown });
+                ranges.push(Range { from: a.from, to: a.to, curvature: Curvature::Unknown });
                 continue;
             }
             for b in planes[k + 1..].iter().filter(|b| b.fits) {
                 let (from, to) = (a.from.max(b.from), a.to.min(b.to));
                 if from <= to {
-                    ranges.push(Range { from, to, shape: shape_of(a, b, rounding) });
+                    ranges.push(Range { from, to, curvature: curvature_of(a, b, rounding) });
                 }
             }
         }
@@ -192,16 +192,16 @@ impl Query<'_> {
             Ok(nearest) => nearest.distance <= deepest,
             Err(_) => false,
         };
-        for part in parts.iter_mut().filter(|part| part.shape != Shape::Unknown) {
+        for part in parts.iter_mut().filter(|part| part.curvature != Curvature::Unknown) {
             if is_deep(part.from) || is_deep(part.to) {
-                part.shape = Shape::Unknown;
+                part.curvature = Curvature::Unknown;
             }
         }
     }
 }
 
-/// Returns the shape of the distance near two planes.
-fn shape_of(a: &Plane, b: &Plane, rounding: f64) -> Shape {
+/// Returns how the distance changes near two planes.
+fn curvature_of(a: &Plane, b: &Plane, rounding: f64) -> Curvature {
     let heights = |a: &Plane, b: &Plane| {
         let corners = a.triangles.iter().flat_map(|corners| corners.iter());
         corners
@@ -209,16 +209,16 @@ fn shape_of(a: &Plane, b: &Plane, rounding: f64) -> Shape {
             .fold([0.0_f64; 2], |[low, high], h| [low.min(h), high.max(h)])
     };
     if a.normal.dot(b.normal) < NARROWEST {
-        return Shape::Unknown;
+        return Curvature::Unknown;
     }
     let ([low, high], [low_b, high_b]) = (heights(a, b), heights(b, a));
     if low.min(low_b) >= -rounding {
         // over a valley that the edge meets head-on, it leaves a face on which it lies
-        if a.slope.abs().max(b.slope.abs()) < FLAT_SLOPE { Shape::Concave } else { Shape::Unknown }
+        if a.slope.abs().max(b.slope.abs()) < FLAT_SLOPE { Curvature::Concave } else { Curvature::Unknown }
     } else if high.max(high_b) <= rounding {
-        Shape::Convex
+        Curvature::Convex
     } else {
-        Shape::Unknown
+        Curvature::Unknown
     }
 }
 
@@ -230,16 +230,17 @@ fn divide(edge: &Segment, ranges: &[Range], parts: &mut Parts) -> bool {
         let ends = ranges.iter().flat_map(|range| [range.from, range.to]);
         let to = ends.filter(|end| *end > from).fold(edge.to, f64::min);
         let middle = 0.5 * (from + to);
-        let over = || ranges.iter().filter(|range| range.from <= middle && middle <= range.to).map(|range| range.shape);
-        let shape = match over().all(|shape| shape == Shape::Concave) {
-            true => Shape::Concave,
-            false if over().all(|shape| shape == Shape::Convex) => Shape::Convex,
-            false => Shape::Unknown,
+        let over =
+            || ranges.iter().filter(|range| range.from <= middle && middle <= range.to).map(|range| range.curvature);
+        let curvature = match over().all(|curvature| curvature == Curvature::Concave) {
+            true => Curvature::Concave,
+            false if over().all(|curvature| curvature == Curvature::Convex) => Curvature::Convex,
+            false => Curvature::Unknown,
         };
         match parts.last_mut() {
-            Some(last) if last.shape == shape => last.to = to,
+            Some(last) if last.curvature == curvature => last.to = to,
             _ => {
-                if parts.try_push(Part { from, to, shape }).is_err() {
+                if parts.try_push(Part { from, to, curvature }).is_err() {
                     return false;
                 }
             }
@@ -273,15 +274,15 @@ fn parts_between(parts: &[Part], [first, last]: [f64; 2], length: f64, least: f6
     joined(&own, least)
 }
 
-/// Joins neighbors of the same shape; short parts are not worth samples at their ends, so their
-/// shape counts as unknown.
+/// Joins neighbors of the same curvature; short parts are not worth samples at their ends, so their
+/// curvature counts as unknown.
 fn joined(parts: &[Part], least: f64) -> Parts {
     let mut joined = Parts::new();
     for part in parts {
-        let shape = if part.to - part.from < least { Shape::Unknown } else { part.shape };
+        let curvature = if part.to - part.from < least { Curvature::Unknown } else { part.curvature };
         match joined.last_mut() {
-            Some(last) if last.shape == shape => last.to = part.to,
-            _ => joined.push(Part { shape, ..*part }),
+            Some(last) if last.curvature == curvature => last.to = part.to,
+            _ => joined.push(Part { curvature, ..*part }),
         }
     }
     joined
@@ -337,20 +338,20 @@ mod tests {
             let place = Pose::from_parts(Translation3::from(at), turn);
             let segment = Segment { start: at, along: place.rotation * Vec3::z(), from: -0.3, to: 0.3 };
             let reach = 0.02 + 0.02 * random(&mut state).abs();
-            for Part { from, to, shape } in query.parts(&segment, &[], reach, 0.015) {
-                seen[shape as usize] += to - from;
+            for Part { from, to, curvature } in query.parts(&segment, &[], reach, 0.015) {
+                seen[curvature as usize] += to - from;
                 let distance = |k: usize| {
                     let s = from + (to - from) * k as f64 / 200.0;
                     field.nearest(&(segment.start + segment.along * s)).distance
                 };
                 let all: Vec<f64> = (0..=200).map(distance).collect();
                 for [a, b, c] in all.windows(3).map(|w| [w[0], w[1], w[2]]).filter(|w| w.iter().all(|d| *d <= reach)) {
-                    match shape {
-                        Shape::Concave => assert!(b >= a.min(c) - 1e-12, "{a} {b} {c}"),
-                        Shape::Convex => assert!(b <= 0.5 * (a + c) + 1e-12, "{a} {b} {c}"),
-                        Shape::Unknown => {}
+                    match curvature {
+                        Curvature::Concave => assert!(b >= a.min(c) - 1e-12, "{a} {b} {c}"),
+                        Curvature::Convex => assert!(b <= 0.5 * (a + c) + 1e-12, "{a} {b} {c}"),
+                        Curvature::Unknown => {}
                     }
-                    assert!(shape == Shape::Unknown || b > -reach, "{b} m deep");
+                    assert!(curvature == Curvature::Unknown || b > -reach, "{b} m deep");
                 }
             }
         }
