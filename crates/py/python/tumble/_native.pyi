@@ -1005,8 +1005,8 @@ class Field:
 class Joint:
     """A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 
-    Its position is an angle (rad), a displacement (m) or a length (m); ``"fixed"``, ``"universal"`` and
-    ``"planar"`` joints have none. Everything can change between steps. All vectors
+    Its position is an angle (rad), a displacement (m) or a length (m), the first of its ``dofs``; ``"fixed"``, ``"gear"`` and
+    ``"rack"`` joints have none. Everything can change between steps. All vectors
     are in world axes.
     """
     @property
@@ -1031,7 +1031,11 @@ class Joint:
     def enabled(self, value: bool) -> None: ...
     @property
     def dofs(self) -> list[JointDof]:
-        """x"""
+        """Its degrees of freedom: (angle) of ``"revolute"``, (displacement) of ``"prismatic"`` and ``"screw"``, (displacement,
+        angle) of ``"cylindrical"``, angles about the axis and the second axis of ``"universal"``, displacements along
+        x and y of b's frame and the angle of ``"planar"``, the rotation vector in b's frame of ``"spherical"``, (length) of kinds with a length.
+        The settings of the joint itself are those of the first one, of a ``"spherical"`` joint of all three.
+        """
     @property
     def position(self) -> float:
         """Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
@@ -1053,17 +1057,21 @@ class Joint:
     def cone(self, value: float | None) -> None: ...
     @property
     def twist_limits(self) -> tuple[float, float] | None:
-        """x"""
+        """Limits of the twist of a ``"spherical"`` joint, (lower, upper), rad, or None: of its rotation about its axis on ``a`` after the shortest
+        turn of that on ``b`` to it.
+        """
     @twist_limits.setter
     def twist_limits(self, value: ArrayLike | None) -> None: ...
     @property
     def effort(self) -> float:
-        """x"""
+        """Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known."""
     @effort.setter
     def effort(self, value: float) -> None: ...
     @property
     def armature(self) -> float:
-        """x"""
+        """Inertia of its rotor, as the joint meets it, kg·m² or kg: it acts between ``a`` and ``b`` against accelerations of the
+        position. Kinds with a length have none.
+        """
     @armature.setter
     def armature(self, value: float) -> None: ...
     @property
@@ -1142,7 +1150,8 @@ class Joint:
         max_force: float | None = None,
     ) -> None:
         """Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
-        the shorter way if the joint has no limits.
+        the shorter way if the joint has no limits. max_force: None: its ``effort``. The targets of a ``"spherical"`` joint are those of all three
+        of its ``dofs``.
         """
     @property
     def force(self) -> _Floats:
@@ -1155,7 +1164,7 @@ class Joint:
         """Torque on ``a`` about its point of the joint, shape (3,), N·m; otherwise as ``force``."""
     @property
     def drive_force(self) -> float:
-        """Force or torque of the drive along the position, N or N·m."""
+        """Force or torque of the drive of its first degree of freedom, N or N·m."""
     @property
     def error(self) -> tuple[float, float]:
         """How far it is open: distance, m, and angle, rad, without the motion that it leaves free."""

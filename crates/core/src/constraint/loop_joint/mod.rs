@@ -329,14 +329,21 @@ impl LoopJoint {
         }
     }
 
+    /// Returns whether it has more than the rows that hold it.
+    fn has_settings(&self) -> bool {
+        let tightens = matches!(self.kind, LoopJointKind::Rope | LoopJointKind::Pulley);
+        let free = self.dofs.iter().all(|dof| *dof == FreeDof::default());
+        tightens || !free || self.cone.is_some() || self.twist_limits.is_some()
+    }
+
     /// Calls `row` with all rows, in their order: held, limits, and for each degree of freedom velocity limits, friction,
     /// damping, spring, drive, armature.
     fn lay(&self, pair: &EndPair, level: Level, time: f64, row: &mut dyn FnMut(JointRow)) {
         pair.held(self.kind, self.length(), &self.transmission, row);
-        let coordinates = self.coordinates(pair);
-        if coordinates.is_empty() {
+        if !self.has_settings() {
             return;
         }
+        let coordinates = self.coordinates(pair);
         self.stops(pair, &coordinates, |coordinate, sign, gap| {
             row(coordinate.row(sign, RowTarget::new(RowSet::HalfLine, gap)));
         });
@@ -426,8 +433,7 @@ impl Constraint for LoopJoint {
     }
 
     fn gaps(&self, _me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
-        let limited = (0..self.dofs.len()).any(|k| self.limits(k).is_some());
-        if !limited && self.cone.is_none() && self.twist_limits.is_none() {
+        if !self.has_settings() {
             return;
         }
         let Some(pair) = self.pair(view) else { return };
