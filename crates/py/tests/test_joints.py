@@ -320,6 +320,14 @@ drive = { type = "velocity", target_rad_per_s = 0 }
     file.step(124)
     assert file.save() == code.save()
     j.armature, j.effort, j.twist_limits = 0.2, 3, None
+    j.set_drive(target=(0.3, -0.2, 0.1), stiffness=50, damping=8)
+    code.step(1200)
+    assert [dof.position for dof in j.dofs] == pytest.approx([0.3, -0.2, 0.1], abs=1e-6)
+    j.set_drive(velocity=(0, 0, 1))
+    code.step(240)
+    assert a.angular_velocity == pytest.approx([0, 0, 1], abs=1e-9)
+    with pytest.raises(tumble.InvalidValueError, match=r"target: expected a number, or shape \(3,\) with one for each degree of freedom, got \(2,\)"):
+        j.set_drive(target=(1, 2), stiffness=1)
     assert [(dof.armature, dof.effort) for dof in j.dofs] == [(0.2, 3)] * 3 and j.twist_limits is None
 
 

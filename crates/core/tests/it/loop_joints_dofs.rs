@@ -342,3 +342,16 @@ fn a_cylindrical_joint_slides_to_its_stop_and_turns_at_its_drive() {
         assert!((x + 0.25).abs() < 1e-6 && (rate - 1.5).abs() < 1e-9, "{stepper}: {x} {rate}");
     }
 }
+
+/// `δω' = δω + dt·τ/(I + a)` in the derivative of a step.
+#[test]
+fn the_derivative_of_a_step_has_the_rotor() {
+    let mut world = no_gravity(world("time_stepping", DT));
+    let id = ball(&mut world, Vec3::zeros(), Vec3::zeros(), Vec3::new(0.0, 0.0, 0.7));
+    let joint = join(&world, LoopJointKind::Revolute, id, None, JointPlace::at(Vec3::zeros()));
+    world.add(joint.with_armature(1.5).unwrap()).unwrap();
+    let step = world.linearize().unwrap();
+    let (turn, rate) = (2, 8);
+    assert!((step.b[(rate, turn)] - DT / 2.0).abs() < 1e-9 * DT, "{:e}", step.b[(rate, turn)]);
+    assert!((step.a[(rate, rate)] - 1.0).abs() < 1e-8, "{}", step.a[(rate, rate)]);
+}

@@ -46,6 +46,7 @@ __all__ = [
     "HalfSpace",
     "HeightField",
     "Joint",
+    "JointDof",
     "LinearizedStep",
     "Mesh",
     "Mimic",
@@ -1143,8 +1144,8 @@ class Joint:
     def set_drive(
         self,
         *,
-        target: float | None = None,
-        velocity: float | None = None,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         max_force: float | None = None,

@@ -1,6 +1,6 @@
 //! A loop joint of a world: a handle that reads from the world at each use.
 
-use crate::arrays::convert::vector;
+use crate::arrays::convert::{Numbers, numbers, shown, vector};
 use crate::errors::{Error, Result};
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
@@ -357,27 +357,37 @@ impl Joint {
     }
 
     /// Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
-    /// the shorter way if the joint has no limits. max_force: None: its ``effort``. The targets of a ``"spherical"`` joint are those of all three
-    /// of its ``dofs``.
+    /// the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
+    /// a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     fn set_drive(
         &self,
         py: Python<'_>,
-        target: Option<f64>,
-        velocity: Option<f64>,
+        target: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
+        let target = target.map(|value| numbers(value, "target")).transpose()?;
+        let velocity = velocity.map(|value| numbers(value, "velocity")).transpose()?;
         self.place.write(py, |inner| {
             inner.note_drives(self.place.id);
             Ok(())
         })?;
         self.change(py, |joint| {
-            let max_force = max_force.unwrap_or(joint.dof().effort);
-            let drive = drive(target, velocity, stiffness, damping, max_force)?;
-            let dof = DofSettings { drive, ..joint.dof().clone() };
-            Ok(joint.set_dof(dof)?)
+            let count = joint.kind().dofs();
+            let of_each = [&target, &velocity].into_iter().flatten().any(|numbers| !numbers.shape.is_empty());
+            for k in 0..if of_each { count } else { 1 } {
+                let settings = joint.dof_at(k).unwrap_or(joint.dof()).clone();
+                let max_force = max_force.unwrap_or(settings.effort);
+                let (target, velocity) =
+                    (number_at("target", &target, k, count)?, number_at("velocity", &velocity, k, count)?);
+                let drive = drive(target, velocity, stiffness, damping, max_force)?;
+                let dof = DofSettings { drive, ..settings };
+                if of_each { joint.set_dof_at(k, dof)? } else { joint.set_dof(dof)? }
+            }
+            Ok(())
         })
     }
 
@@ -409,6 +419,19 @@ impl Joint {
             let error = joint.position_error(&inner.world.view()).unwrap_or_default();
             Some((error.distance, error.angle))
         })
+    }
+}
+
+/// Returns the number for degree of freedom `k` of an argument with one number, or one for each of `count`.
+fn number_at(name: &str, given: &Option<Numbers>, k: usize, count: usize) -> Result<Option<f64>> {
+    let Some(Numbers { shape, data }) = given else { return Ok(None) };
+    match shape.as_slice() {
+        [] => Ok(data.first().copied()),
+        [n] if *n == count => Ok(data.get(k).copied()),
+        _ => Err(Error::value(format!(
+            "{name}: expected a number, or shape ({count},) with one for each degree of freedom, got {}",
+            shown(shape)
+        ))),
     }
 }
 
