@@ -55,7 +55,7 @@ impl LoopJoint {
     /// 3π/2 apart follows its angle from frame to frame instead, so it does not
     /// pass its stops. A joint of a world gets other limits by [`World::change_joint`](crate::World::change_joint). A spherical
     /// joint has [cones](Self::set_cone) and [limits of its twist](Self::set_twist_limits) instead of limits; targets and rest positions of its three
-    /// degrees of freedom are the components of a rotation vector.
+    /// degrees of freedom are the components of a rotation vector. A velocity drive of it that may meet them needs a largest torque.
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
