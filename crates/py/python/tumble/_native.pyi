@@ -1151,8 +1151,8 @@ class Joint:
         max_force: float | None = None,
     ) -> None:
         """Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
-        the shorter way if the joint has no limits. max_force: None: its ``effort``. The targets of a ``"spherical"`` joint are those of all three
-        of its ``dofs``.
+        the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
+        a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
         """
     @property
     def force(self) -> _Floats:
