@@ -228,16 +228,119 @@ def test_what_is_wrong_is_named():
         with pytest.raises(tumble.TumbleError, match=wrong):
             world.add_joint(**words)
         assert world.joints == []
-    joint = world.add_joint("planar", ball)
-    with pytest.raises(tumble.InvalidValueError, match="a planar joint, which has no position"):
+    joint = world.add_joint("fixed", ball)
+    with pytest.raises(tumble.InvalidValueError, match="a fixed joint, which has no position"):
         _ = joint.position
-    with pytest.raises(tumble.InvalidValueError, match="a planar joint has no limits"):
+    with pytest.raises(tumble.InvalidValueError, match="a fixed joint has no limits"):
         joint.damping = 1
+    world.remove(joint)
+    joint = world.add_joint("planar", ball)
     with pytest.raises(tumble.InvalidValueError, match="a planar joint has no length"):
         joint.length = 1
+    with pytest.raises(tumble.InvalidValueError, match="a planar joint has no cone"):
+        world.add_joint("planar", ball, cone=1)
+    with pytest.raises(tumble.InvalidValueError, match="there is no degree of freedom 3; a planar joint has 3"):
+        world.add_joint("planar", ball, dofs=[{}, {}, {}, {}])
+    with pytest.raises(tumble.InvalidValueError, match="`frictoin` is not known"):
+        world.add_joint("planar", ball, dofs=[dict(frictoin=1)])
+    with pytest.raises(tumble.InvalidValueError, match="the armature is -1"):
+        joint.dofs[1].armature = -1
+    with pytest.raises(tumble.InvalidValueError, match="at most 3π/2"):
+        joint.dofs[2].limits = (-3, 3)
     with pytest.raises(tumble.UnknownNameError, match="no joint named 'ball'"):
         world.joint("ball")
     assert repr(joint) == f"<tumble.Joint '{joint.name}', planar>"
+
+
+def test_every_degree_of_freedom_has_settings_of_its_own(tmp_path):
+    world = tumble.World(gravity=(0, 0, 0))
+    body = world.add_rigid("body", tumble.Box(0.2), mass=2, inertia=(0.5, 0.5, 0.5), collidable=False)
+    dofs = [dict(limits=(-1, 0.5), damping=0.5), dict(stiffness=8, armature=3), dict(effort=2, drive=dict(velocity=9), max_velocity=3, friction=0)]
+    table = world.add_joint("planar", body, dofs=dofs, name="table")
+    x, y, turn = table.dofs
+    assert (x, repr(y)) == (table.dofs[0], "<tumble.JointDof 1 of 'table'>") and len({x, y, turn, table.dofs[2]}) == 3
+    body.velocity = (2, 0.4, 0)
+    world.step(240)
+    # y: ω² = 8/(2 + 3); the velocity is that of the body, which has 2 kg of the 5
+    assert y.position == pytest.approx(0.4 / np.sqrt(8 / 5) * np.sin(np.sqrt(8 / 5)), abs=2e-4)
+    assert x.position == pytest.approx(0.5, abs=1e-6) and turn.velocity == pytest.approx(3, abs=1e-9)
+    assert turn.position == pytest.approx(3 - 0.5 * 9 / 4, abs=1e-2)
+    assert world.energy().kinetic == pytest.approx(0.5 * 5 * y.velocity**2 + 0.5 * 0.5 * 9, rel=1e-9)
+    turn.set_drive(velocity=0)
+    world.step()
+    assert turn.drive_force == pytest.approx(-2) and table.drive_force == 0
+    turn.limits, x.rest, x.stiffness, y.effort = (-1, 3), 0.1, 4, 7
+    names = ("limits", "damping", "friction", "stiffness", "rest", "max_velocity", "effort", "armature")
+    world.save_scene(tmp_path / "table.toml")
+    (tmp_path / "table.toml").write_text((tmp_path / "table.toml").read_text() + "# edited\n")
+    others = (copy.deepcopy(world), pickle.loads(pickle.dumps(world)), tumble.World.load(tmp_path / "table.toml"))
+    for other in others:
+        for ours, theirs in zip(table.dofs, other.joint("table").dofs, strict=True):
+            assert [getattr(ours, name) for name in names] == [getattr(theirs, name) for name in names]
+        other.step(30)
+        assert other.joint("table").dofs[2].velocity == pytest.approx(3 - 2 / 0.5 * 31 / 240, abs=1e-9)
+    kept = world.save()
+    turn.set_drive(velocity=1), y.set_drive(velocity=1)
+    world.restore(kept)
+    world.step(30)
+    assert world.state == pytest.approx(others[0].state, abs=0)
+    world.remove(table)
+    with pytest.raises(tumble.RemovedError):
+        _ = x.position
+
+
+def test_armature_effort_and_twist_are_settings_of_joints():
+    file = tumble.World.parse("""
+[world]
+gravity_m_per_s2 = [0, 0, 0]
+[[body]]
+name = "a"
+shape = { type = "sphere", radius_m = 0.1 }
+mass_kg = 2
+angular_velocity_rad_per_s = [0, 0, 2]
+[[loop_joint]]
+name = "j"
+type = "spherical"
+a = "a"
+position_m = [0, 0, 0]
+twist_limits_rad = [-1, 0.5]
+armature_kg_m2 = 0.1
+effort_n_m = 0.02
+drive = { type = "velocity", target_rad_per_s = 0 }
+""")
+    code = tumble.World(gravity=(0, 0, 0))
+    a = code.add_rigid("a", tumble.Sphere(0.1), mass=2, angular_velocity=(0, 0, 2))
+    j = code.add_joint("spherical", a, name="j", twist_limits=(-1, 0.5), armature=0.1, effort=0.02, drive=dict(velocity=0))
+    assert (j.twist_limits, j.armature, j.effort, j.cone, j.limits) == ((-1, 0.5), 0.1, 0.02, None, None)
+    speed = a.angular_velocity[2]
+    code.step(24)
+    assert speed - a.angular_velocity[2] == pytest.approx(0.02 / (0.4 * 2 * 0.01 + 0.1) * 0.1, abs=1e-9)
+    code.step(100)
+    assert 2 * np.arctan2(a.orientation[2], a.orientation[3]) == pytest.approx(0.5, abs=1e-6)
+    file.step(124)
+    assert file.save() == code.save()
+    j.armature, j.effort, j.twist_limits = 0.2, 3, None
+    j.set_drive(target=(0.3, -0.2, 0.1), stiffness=50, damping=8)
+    code.step(1200)
+    assert [dof.position for dof in j.dofs] == pytest.approx([0.3, -0.2, 0.1], abs=1e-6)
+    j.set_drive(velocity=(0, 0, 1))
+    code.step(240)
+    assert a.angular_velocity == pytest.approx([0, 0, 1], abs=1e-9)
+    with pytest.raises(tumble.InvalidValueError, match=r"target: expected a number, or shape \(3,\) with one for each degree of freedom, got \(2,\)"):
+        j.set_drive(target=(1, 2), stiffness=1)
+    assert [(dof.armature, dof.effort) for dof in j.dofs] == [(0.2, 3)] * 3 and j.twist_limits is None
+
+
+def test_a_pulley_without_a_length_keeps_its_rope_taut():
+    world = tumble.World()
+    a, b = (world.add_rigid(name, **POINT, position=(x, 0, 0)) for name, x in (("a", 0), ("b", 1)))
+    pulley = world.add_joint("pulley", a, b, ground=[(0, 0, 2), (1, 0, 3)])
+    assert pulley.length == 5
+    pulley.ratio = 2
+    assert pulley.length == 8
+    pulley.length = 8
+    pulley.ratio = 1
+    assert pulley.length == 8
 
 
 TRANSMISSIONS = """

@@ -93,7 +93,7 @@ pub use parse::event::{EventSpec, TemplateSpec};
 pub use parse::file::{MAX_BYTES, SceneFile};
 pub use parse::joint::{JointSpec, MimicSpec};
 pub use parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec, Surface};
-pub use parse::loop_joint::{LoopJointSpec, PartSpec};
+pub use parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
 pub use parse::material::MaterialSpec;
 pub use parse::mesh::{MeshSource, MeshSpec};
 pub use parse::mimic::{JointMimicSpec, JointSideSpec};

@@ -111,8 +111,11 @@ pub(super) struct LoopJointRecord {
     name: String,
     kind: LoopJointKind,
     sides: [Side; 2],
-    dof: DofSettings,
-    length: f64,
+    /// Settings and armature of each degree of freedom.
+    dofs: Vec<(DofSettings, f64)>,
+    cone: Option<f64>,
+    twist_limits: Option<[f64; 2]>,
+    length: Option<f64>,
     breaking: [f64; 2],
     transmission: Transmission,
 }
@@ -124,8 +127,12 @@ impl LoopJointRecord {
             name: loop_joint.name().into(),
             kind: loop_joint.kind(),
             sides: loop_joint.sides().map(side),
-            dof: loop_joint.dof().clone(),
-            length: loop_joint.length(),
+            dofs: (0..loop_joint.kind().dofs())
+                .filter_map(|k| Some((loop_joint.dof_at(k)?.clone(), loop_joint.armature_at(k)?)))
+                .collect(),
+            cone: loop_joint.cone(),
+            twist_limits: loop_joint.twist_limits(),
+            length: loop_joint.given_length(),
             breaking: loop_joint.breaking(),
             transmission: *loop_joint.transmission(),
         }
@@ -138,10 +145,15 @@ impl LoopJointRecord {
         });
         let mut joint = LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)?;
         joint.set_transmission(self.transmission).map_err(damaged)?;
-        if self.kind.has_length() {
-            joint.set_length(self.length).map_err(damaged)?;
+        if let Some(length) = self.length {
+            joint.set_length(length).map_err(damaged)?;
         }
-        joint.set_dof(self.dof).map_err(damaged)?;
+        for (k, (dof, armature)) in self.dofs.into_iter().enumerate() {
+            joint.set_dof_at(k, dof).map_err(damaged)?;
+            joint.set_armature_at(k, armature).map_err(damaged)?;
+        }
+        joint.set_cone(self.cone).map_err(damaged)?;
+        joint.set_twist_limits(self.twist_limits).map_err(damaged)?;
         let [force, torque] = self.breaking;
         joint.set_breaking(force, torque).map_err(damaged)?;
         Ok(joint)

@@ -254,8 +254,7 @@ impl Mimic {
 /// Returns whether the position of a joint has a step of 2π.
 fn wraps(joint: JointRef, view: &WorldView) -> bool {
     let JointRef::LoopJoint(id) = joint else { return false };
-    view.get::<LoopJoint>(id)
-        .is_some_and(|joint| joint.kind() == LoopJointKind::Revolute && joint.dof().limits.is_none())
+    view.get::<LoopJoint>(id).is_some_and(|joint| joint.kind().turns() && joint.dof().limits.is_none())
 }
 
 /// Returns the smallest whole number up to [`MAX_DENOMINATOR`] whose product with `ratio` is whole to rounding.

@@ -112,11 +112,19 @@ pub struct RowTarget {
     /// Share of the step after which a soft row at the acceleration level has its target velocity:
     /// 1, or ½ for the implicit midpoint rule.
     pub share: f64,
+    /// Whether the row is an inertia `1/R` that resists changes of its velocity: its target is the velocity before, and it
+    /// takes part in impacts.
+    pub inertial: bool,
 }
 
 impl RowTarget {
     /// Makes a rigid row with target velocity 0 and the given set and position error.
     pub fn new(set: RowSet, error: f64) -> RowTarget {
-        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0, share: 1.0 }
+        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0, share: 1.0, inertial: false }
+    }
+
+    /// Makes a row that adds an inertia to the bodies along its velocity, such as that of a rotor, kg or kg·m², above 0.
+    pub fn inertia(inertia: f64) -> RowTarget {
+        RowTarget { compliance: 1.0 / inertia, inertial: true, ..RowTarget::new(RowSet::Equality, 0.0) }
     }
 }

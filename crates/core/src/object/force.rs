@@ -14,4 +14,10 @@ pub trait ForceGenerator {
         let _ = view;
         0.0
     }
+    /// Returns the kinetic energy of inertias that the object adds to others, such as the rotors of joints, J; 0 by default. It is part
+    /// of [`World::energy`](crate::World::energy).
+    fn kinetic(&self, view: &WorldView) -> f64 {
+        let _ = view;
+        0.0
+    }
 }

@@ -176,7 +176,8 @@ impl Core {
             let any: &dyn std::any::Any = entry.object;
             if let Some(joint) = any.downcast_ref::<LoopJoint>() {
                 let sum = joint.transmitted(&view, rows);
-                out.joints.push((entry.serial, JointLoad { force: sum.force, torque: sum.torque, drive: sum.drive }));
+                out.joints
+                    .push((entry.serial, JointLoad { force: sum.force, torque: sum.torque, drive: sum.drives[0] }));
                 joint.add_wrenches(&view, rows, &mut out.wrenches);
             } else if let Some(mimic) = any.downcast_ref::<Mimic>() {
                 rows.iter().for_each(|row| mimic.add_wrenches(&view, row.force, &mut out.wrenches));

@@ -90,7 +90,7 @@ const CORRECTIONS: u32 = 2;
 
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
 fn is_soft(target: &RowTarget) -> bool {
-    target.compliance > 0.0
+    target.compliance > 0.0 && !target.inertial
 }
 
 impl Stepper for Backtracking {
@@ -165,6 +165,8 @@ impl Backtracking {
         build_rows(core, None, &mut self.work, Level::Acceleration { h: left, soft }, 0.0)?;
         let soft = match core.settings.integrator {
             _ if self.is_stiff() => soft,
+            // a rotor divides soft forces with the bodies, so they are rows too
+            _ if self.work.targets.iter().any(|t| t.inertial) => Some(0.5 * left),
             Integrator::Verlet => Some(0.5 * left),
             _ => None,
         };
@@ -332,6 +334,10 @@ impl Backtracking {
         let contact_constraints = work.contact_constraints.len();
         for (i, target) in work.targets.iter().enumerate() {
             let row = work.rows.blocks[contact_constraints + i].row as usize;
+            if target.inertial {
+                work.c[row] += target.bias_acceleration;
+                continue;
+            }
             // rows are those of the middle of the step, and turn further in its second half
             let over = if is_soft(target) { target.share * left } else { left };
             work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / over;

@@ -12,6 +12,7 @@
 //! | joint (rigid equality) | always | measured at `x` |
 //! | limit (half-line) | while active: violated, or with a force in the step | measured at `x` |
 //! | contact (half-line) | in the first round (`overlap.rs`) | to first order |
+//! | inertia (soft) | always: it is part of `M` | none |
 //!
 //! All callers use this one routine: the middle of a step ([`middle`]), its end in both steppers,
 //! and overlap of bodies in place ([`correct`]). All linear problems go to the solver of the world.

@@ -156,10 +156,11 @@ fn at_stop(t: &RowTarget, reach: f64) -> bool {
     t.set == RowSet::HalfLine && t.error <= reach && t.compliance == 0.0
 }
 
-/// Subtracts the target velocities of the constraints' rows.
+/// Subtracts the target velocities of the constraints' rows; an inertia keeps the velocity that it has.
 fn aim_constraints(work: &Workspace, c: &mut [f64]) {
     for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets) {
-        c[block.row as usize] -= target.velocity;
+        let c = &mut c[block.row as usize];
+        *c = if target.inertial { 0.0 } else { *c - target.velocity };
     }
 }
 
@@ -175,7 +176,8 @@ fn reflect(core: &mut Core, work: &mut Workspace, c: &[f64], parts: &[Part], (el
         budget: None,
     };
     work.islands.build(&work.rows, |b| {
-        let takes_part = |t: &RowTarget| (t.set == RowSet::Equality && t.compliance == 0.0) || at_stop(t, reach);
+        let holds = |t: &RowTarget| t.set == RowSet::Equality && (t.compliance == 0.0 || t.inertial);
+        let takes_part = |t: &RowTarget| holds(t) || at_stop(t, reach);
         if b < contact_constraints { parts[b].member } else { takes_part(&targets[b - contact_constraints]) }
     });
     work.c.copy_from_slice(c);
@@ -225,9 +227,11 @@ fn rows_of<'a>(rows: &'a Rows, blocks: &'a [u32]) -> impl Iterator<Item = usize>
     blocks.iter().flat_map(|&b| rows.blocks[b as usize].range())
 }
 
-/// Returns the kinetic energy that the multipliers add, J: `λᵀc + ½λᵀKλ = ½ Σ λ·(c + w)`.
+/// Returns the kinetic energy that the multipliers add, J: `λᵀc + ½λᵀKλ = ½ Σ λ·(c + w)`. What rows of inertias take from
+/// the bodies they have themselves, so they are left out.
 fn work_done(rows: &Rows, blocks: &[u32], c: &[f64], lambda: &[f64], du: &[f64]) -> f64 {
-    let pairs = blocks.iter().flat_map(|&b| {
+    let inertial = |b: u32| rows.blocks[b as usize].compliance > 0.0;
+    let pairs = blocks.iter().filter(|b| !inertial(**b)).flat_map(|&b| {
         let block = &rows.blocks[b as usize];
         block.range().enumerate().map(move |(k, row)| lambda[row] * (c[row] + 0.5 * rows.row_velocity(block, k, du)))
     });

@@ -242,6 +242,12 @@ impl TimeStepping {
         let constraints = (work.contact_constraints.len()..).zip(&work.targets);
         for ((b, target), block) in constraints.zip(&work.rows.blocks[work.contact_constraints.len()..]) {
             let (change, turning) = free.of_row(&work.rows, block, 0);
+            if target.inertial {
+                // from the velocity after impacts to that at the end of the step
+                let forced = work.rows.row_velocity(block, 0, du_force);
+                work.c[block.row as usize] = forced + 2.0 * change - h * turning + h * target.bias_acceleration;
+                continue;
+            }
             work.c[block.row as usize] += change - 0.5 * h * turning;
             let open = target.set == RowSet::HalfLine && core.branches.take(Switch::Gap, None, target.error > 0.0);
             let reach = if open { target.error / h } else { 0.0 };

@@ -317,7 +317,7 @@ impl World {
         self.core.objects().all().filter_map(|e| e.object.renderable()).flat_map(|renderable| renderable.visuals())
     }
 
-    /// Returns the mechanical energy of all dynamic objects and of the springs between them, J.
+    /// Returns the mechanical energy of all dynamic objects, and of the springs and rotors between them, J.
     pub fn energy(&self) -> Energy {
         let g = self.core.settings.gravity;
         let bodies = self.moving().fold(Energy::default(), |sum, (x, body)| {
@@ -325,8 +325,11 @@ impl World {
             Energy { kinetic: sum.kinetic + e.kinetic, potential: sum.potential + e.potential }
         });
         let (view, enabled) = (self.view(), self.core.objects().all().filter(|e| e.status.enabled));
-        let springs: f64 = enabled.filter_map(|e| e.object.force()).map(|force| force.potential(&view)).sum();
-        Energy { potential: bodies.potential + springs, ..bodies }
+        let forces = enabled.filter_map(|e| e.object.force());
+        forces.fold(bodies, |sum, force| Energy {
+            kinetic: sum.kinetic + force.kinetic(&view),
+            potential: sum.potential + force.potential(&view),
+        })
     }
 
     /// Returns the momentum of all dynamic objects: linear, kg·m/s, and angular about the world's

@@ -272,7 +272,7 @@ fn drives_reach_their_balance() {
         let torque = stiffness * (target - angle);
         assert!((torque - 2.0 * G * angle.cos()).abs() < 1e-6, "{stepper}: {angle}");
         let carried = world.joint_force(joint).unwrap();
-        assert!((carried.drive - torque).abs() < 1e-6, "{stepper}: {carried:?} for {torque}");
+        assert!((carried.drives[0] - torque).abs() < 1e-6, "{stepper}: {carried:?} for {torque}");
         assert!(
             (carried.torque + Vec3::y() * torque).norm() < 1e-6 && (carried.force - Vec3::z() * 2.0 * G).norm() < 1e-6
         );
@@ -311,7 +311,7 @@ fn a_weak_drive_and_friction_give_way_at_their_limits() {
                     "{stepper}: {:?}",
                     coordinate(&world, joint)
                 );
-                assert_eq!(world.joint_force(joint).unwrap().drive != 0.0, !friction);
+                assert_eq!(world.joint_force(joint).unwrap().drives[0] != 0.0, !friction);
             }
         }
     }
@@ -327,7 +327,7 @@ fn reactions_of_a_cantilever() {
         let joint = world.add(joint).unwrap();
         assert_eq!(world.joint_force(joint).unwrap(), JointForce::default());
         run(&mut world, 0.5);
-        let JointForce { force, torque, drive } = world.joint_force(joint).unwrap();
+        let JointForce { force, torque, drives: [drive, ..] } = world.joint_force(joint).unwrap();
         // the torque about the point on the wall, on the ball: it turns −y·(r·m·g) of the weight back
         assert!((force - Vec3::z() * 2.0 * G).norm() < 1e-6 && drive == 0.0, "{stepper}: {force:?}");
         assert!((torque + Vec3::y() * 2.0 * G).norm() < 1e-6, "{stepper}: {torque:?}");
@@ -453,7 +453,7 @@ fn wrong_settings_are_named() {
     let joint = |kind| join(&world, kind, id, None, JointPlace::between(Vec3::zeros(), Vec3::x()));
     let of = |result: Result<LoopJoint, LoopJointError>| result.unwrap_err().to_string();
     for (message, words) in [
-        (of(joint(LoopJointKind::Planar).with_limits([0.0, 1.0])), "a planar joint has no limits"),
+        (of(joint(LoopJointKind::Fixed).with_limits([0.0, 1.0])), "a fixed joint has no limits"),
         (of(joint(LoopJointKind::Revolute).with_length(1.0)), "a revolute joint has no length"),
         (of(joint(LoopJointKind::Rope).with_length(-1.0)), "the length is -1; it must be finite and at least 0"),
         (of(joint(LoopJointKind::Revolute).with_limits([1.0, 0.0])), "the lower limit is 1"),

@@ -46,6 +46,7 @@ mod linearize;
 mod link_surfaces;
 mod loop_joints;
 mod loop_joints_articulated;
+mod loop_joints_dofs;
 mod loop_joints_governor;
 mod loop_joints_joints;
 mod loop_joints_kinds;

@@ -161,13 +161,18 @@ fn wrong_settings_of_a_spherical_joint_and_wrong_velocity_limits_are_refused() {
     let id = world.add(RigidBody::new(sphere(0.1))).unwrap();
     let pin = || LoopJoint::spherical_at("pin", &world, Some((id, 0)), None, Vec3::zeros()).unwrap();
     let why = |joint: Result<LoopJoint, LoopJointError>| joint.unwrap_err().to_string();
-    assert!(why(pin().with_limits([-0.1, 0.5])).contains("a cone has no lower limit"));
-    assert!(why(pin().with_cone(-0.5)).contains("limit"));
+    assert!(why(pin().with_limits([-0.1, 0.5])).contains("it has a cone and limits of its twist"));
+    assert!(why(pin().with_cone(-0.5)).contains("the cone is -0.5"));
+    assert!(why(pin().with_twist_limits([1.0, 0.0])).contains("the lower limit of the twist is 1"));
+    assert!(why(pin().with_armature(-1.0)).contains("the armature is -1"));
     assert!(why(pin().with_max_velocity(0.0)).contains("above 0"));
-    let drive = Drive::Velocity { target: 1.0, limit: 1.0 };
-    assert!(why(pin().with_dof(DofSettings { drive, ..DofSettings::default() })).contains("springs and drives"));
+    assert!(why(pin().with_dof_at(3, DofSettings::default())).contains("a spherical joint has 3, from 0"));
     let hinge = LoopJoint::revolute_at("hinge", &world, Some((id, 0)), None, Vec3::zeros(), Vec3::x()).unwrap();
     assert!(why(hinge.clone().with_cone(0.5)).contains("cone"));
+    assert!(why(hinge.clone().with_twist_limits([0.0, 1.0])).contains("a revolute joint has no twist"));
+    let far = JointPlace::between(Vec3::zeros(), Vec3::x());
+    let rope = LoopJoint::joining("rope", LoopJointKind::Rope, &world, Some((id, 0)), None, far).unwrap();
+    assert!(why(rope.with_armature(1.0)).contains("a rope joint has no armature"));
     assert!(why(hinge.with_max_velocity(f64::NAN)).contains("above 0"));
 }
 

@@ -46,6 +46,7 @@ __all__ = [
     "HalfSpace",
     "HeightField",
     "Joint",
+    "JointDof",
     "LinearizedStep",
     "Mesh",
     "Mimic",
@@ -1023,8 +1024,8 @@ class Field:
 class Joint:
     """A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 
-    Its position is an angle (rad), a displacement (m) or a length (m); ``"fixed"``, ``"universal"`` and
-    ``"planar"`` joints have none. Everything can change between steps. All vectors
+    Its position is an angle (rad), a displacement (m) or a length (m), the first of its ``dofs``; ``"fixed"``, ``"gear"`` and
+    ``"rack"`` joints have none. Everything can change between steps. All vectors
     are in world axes.
     """
     @property
@@ -1048,6 +1049,13 @@ class Joint:
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
+    def dofs(self) -> list[JointDof]:
+        """Its degrees of freedom: (angle) of ``"revolute"``, (displacement) of ``"prismatic"`` and ``"screw"``, (displacement,
+        angle) of ``"cylindrical"``, angles about the axis and the second axis of ``"universal"``, displacements along
+        x and y of b's frame and the angle of ``"planar"``, the rotation vector in b's frame of ``"spherical"``, (length) of kinds with a length.
+        The settings of the joint itself are those of the first one, of a ``"spherical"`` joint of all three.
+        """
+    @property
     def position(self) -> float:
         """Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
         the angle between both axes of a ``"spherical"`` joint. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
@@ -1066,6 +1074,25 @@ class Joint:
         """Largest swing of a ``"spherical"`` joint, rad, or None: its axis on ``a`` stays in this cone about that on ``b``."""
     @cone.setter
     def cone(self, value: float | None) -> None: ...
+    @property
+    def twist_limits(self) -> tuple[float, float] | None:
+        """Limits of the twist of a ``"spherical"`` joint, (lower, upper), rad, or None: of its rotation about its axis on ``a`` after the shortest
+        turn of that on ``b`` to it.
+        """
+    @twist_limits.setter
+    def twist_limits(self, value: ArrayLike | None) -> None: ...
+    @property
+    def effort(self) -> float:
+        """Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known."""
+    @effort.setter
+    def effort(self, value: float) -> None: ...
+    @property
+    def armature(self) -> float:
+        """Inertia of its rotor, as the joint meets it, kg·m² or kg: it acts between ``a`` and ``b`` against accelerations of the
+        position. Kinds with a length have none.
+        """
+    @armature.setter
+    def armature(self, value: float) -> None: ...
     @property
     def max_velocity(self) -> float:
         """Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
@@ -1135,14 +1162,15 @@ class Joint:
     def set_drive(
         self,
         *,
-        target: float | None = None,
-        velocity: float | None = None,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         max_force: float | None = None,
     ) -> None:
         """Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
-        the shorter way if the joint has no limits.
+        the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
+        a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
         """
     @property
     def force(self) -> _Floats:
@@ -1155,10 +1183,78 @@ class Joint:
         """Torque on ``a`` about its point of the joint, shape (3,), N·m; otherwise as ``force``."""
     @property
     def drive_force(self) -> float:
-        """Force or torque of the drive along the position, N or N·m."""
+        """Force or torque of the drive of its first degree of freedom, N or N·m."""
     @property
     def error(self) -> tuple[float, float]:
         """How far it is open: distance, m, and angle, rad, without the motion that it leaves free."""
+    def __repr__(self) -> str: ...
+    def __eq__(self, value: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class JointDof:
+    """One degree of freedom that a joint leaves free: a member of ``Joint.dofs``. Its settings are those of the joint,
+    and can change between steps.
+    """
+    @property
+    def position(self) -> float:
+        """Position, rad or m; 0 where the joint was made, except for a length."""
+    @property
+    def velocity(self) -> float:
+        """Rate of the position, rad/s or m/s; of a ``"spherical"`` joint the angular velocity about the axis."""
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Limits of the position, (lower, upper), rad or m, or None."""
+    @limits.setter
+    def limits(self, value: ArrayLike | None) -> None: ...
+    @property
+    def max_velocity(self) -> float:
+        """Largest speed of the position, rad/s or m/s; infinite for none."""
+    @max_velocity.setter
+    def max_velocity(self, value: float) -> None: ...
+    @property
+    def damping(self) -> float:
+        """Viscous damping, N·m·s/rad or N·s/m."""
+    @damping.setter
+    def damping(self, value: float) -> None: ...
+    @property
+    def friction(self) -> float:
+        """Dry friction: largest torque or force, N·m or N."""
+    @friction.setter
+    def friction(self, value: float) -> None: ...
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of its spring, N·m/rad or N/m; 0 without one."""
+    @stiffness.setter
+    def stiffness(self, value: float) -> None: ...
+    @property
+    def rest(self) -> float:
+        """Position at which its spring is at rest, rad or m."""
+    @rest.setter
+    def rest(self, value: float) -> None: ...
+    @property
+    def effort(self) -> float:
+        """Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known."""
+    @effort.setter
+    def effort(self, value: float) -> None: ...
+    @property
+    def armature(self) -> float:
+        """Inertia of its rotor, as the joint meets it, kg·m² or kg."""
+    @armature.setter
+    def armature(self, value: float) -> None: ...
+    def set_drive(
+        self,
+        *,
+        target: float | None = None,
+        velocity: float | None = None,
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        max_force: float | None = None,
+    ) -> None:
+        """Sets its drive; the arguments are those of ``Joint.set_drive``."""
+    @property
+    def drive_force(self) -> float:
+        """Force or torque of the drive, N or N·m."""
     def __repr__(self) -> str: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -1282,7 +1378,7 @@ class Articulation:
         floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
         name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
         collision meshes. collision_meshes: ``"exact"`` or ``"hull"``. velocity_limits: whether the largest
-        velocities of joints are enforced.
+        velocities of joints are enforced, as ``max_velocity``, against any force; False: they are read and have no effect.
         """
     @staticmethod
     def from_mjcf(
@@ -2628,6 +2724,10 @@ class World:
         ground: ArrayLike | None = None,
         cone: float | None = None,
         max_velocity: float | None = None,
+        effort: float | None = None,
+        armature: float = 0.0,
+        twist_limits: ArrayLike | None = None,
+        dofs: Sequence[Mapping[str, Any]] | None = None,
     ) -> Joint:
         """Joins two bodies, or a body and the world, in their present poses, and returns the joint.
 
@@ -2648,8 +2748,10 @@ class World:
 
         limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
         ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
-        cone: largest angle of a spherical joint between its axis on a and that on b, rad. max_velocity: largest speed
-        of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+        cone: largest angle of a spherical joint between its axis on a and that on b, rad; twist_limits: (lower, upper) of its turn about that axis, rad. max_velocity: largest speed
+        of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. effort: the force of its motor, N·m or N, which limits drives
+        that name no max_force. armature: inertia of its rotor, kg·m² or kg. dofs: dicts of these settings for each degree of freedom in the order of
+        ``Joint.dofs``, where the joint has several; without them they are those of the first one, of a spherical joint of all three. breaking_force, N, and breaking_torque about the
         point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
         are in the world.

@@ -96,7 +96,7 @@ impl Articulation {
     /// floating: whether the root floats; otherwise it is fixed to the base. packages: folders by
     /// name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for missing
     /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``. velocity_limits: whether the largest
-    /// velocities of joints are enforced.
+    /// velocities of joints are enforced, as ``max_velocity``, against any force; False: they are read and have no effect.
     #[staticmethod]
     #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact", velocity_limits=false))]
     pub fn from_urdf(

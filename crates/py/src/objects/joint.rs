@@ -1,10 +1,11 @@
 //! A loop joint of a world: a handle that reads from the world at each use.
 
-use crate::arrays::convert::vector;
+use crate::arrays::convert::{Numbers, numbers, shown, vector};
 use crate::errors::{Error, Result};
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
 use crate::objects::handle::handle;
+use crate::objects::joint_dof::JointDof;
 use crate::objects::joints::drive;
 use crate::objects::place::{Place, found};
 use crate::world::gc::Anchor;
@@ -14,8 +15,8 @@ use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Spring
 
 /// A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 ///
-/// Its position is an angle (rad), a displacement (m) or a length (m); ``"fixed"``, ``"universal"`` and
-/// ``"planar"`` joints have none. Everything can change between steps. All vectors
+/// Its position is an angle (rad), a displacement (m) or a length (m), the first of its ``dofs``; ``"fixed"``, ``"gear"`` and
+/// ``"rack"`` joints have none. Everything can change between steps. All vectors
 /// are in world axes.
 #[pyclass(frozen, module = "tumble")]
 pub struct Joint {
@@ -123,6 +124,16 @@ impl Joint {
         self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
     }
 
+    /// Its degrees of freedom: (angle) of ``"revolute"``, (displacement) of ``"prismatic"`` and ``"screw"``, (displacement,
+    /// angle) of ``"cylindrical"``, angles about the axis and the second axis of ``"universal"``, displacements along
+    /// x and y of b's frame and the angle of ``"planar"``, the rotation vector in b's frame of ``"spherical"``, (length) of kinds with a length.
+    /// The settings of the joint itself are those of the first one, of a ``"spherical"`` joint of all three.
+    #[getter]
+    fn dofs(&self, py: Python<'_>) -> Result<Vec<JointDof>> {
+        let count = self.constant(|joint| joint.kind().dofs())?;
+        (0..count).map(|k| JointDof::new(py, self.place.clone(), k)).collect()
+    }
+
     /// Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
     /// the angle between both axes of a ``"spherical"`` joint. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
     /// of the middle of its limits.
@@ -159,9 +170,44 @@ impl Joint {
     fn set_cone(&self, py: Python<'_>, value: Option<f64>) -> Result<()> {
         self.change(py, |joint| {
             is_of(joint, LoopJointKind::Spherical)?;
-            let dof = DofSettings { limits: value.map(|cone| [0.0, cone]), ..joint.dof().clone() };
-            Ok(joint.set_dof(dof)?)
+            Ok(joint.set_cone(value)?)
         })
+    }
+
+    /// Limits of the twist of a ``"spherical"`` joint, (lower, upper), rad, or None: of its rotation about its axis on ``a`` after the shortest
+    /// turn of that on ``b`` to it.
+    #[getter]
+    fn twist_limits(&self) -> Result<Option<(f64, f64)>> {
+        self.constant(|joint| joint.twist_limits().map(|[lower, upper]| (lower, upper)))
+    }
+
+    #[setter]
+    fn set_twist_limits(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let limits = value.map(pair).transpose()?;
+        self.change(py, |joint| Ok(joint.set_twist_limits(limits)?))
+    }
+
+    /// Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known.
+    #[getter]
+    fn effort(&self) -> Result<f64> {
+        self.constant(|joint| joint.dof().effort)
+    }
+
+    #[setter]
+    fn set_effort(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change_dof(py, |dof| dof.effort = value)
+    }
+
+    /// Inertia of its rotor, as the joint meets it, kg·m² or kg: it acts between ``a`` and ``b`` against accelerations of the
+    /// position. Kinds with a length have none.
+    #[getter]
+    fn armature(&self) -> Result<f64> {
+        self.constant(LoopJoint::armature)
+    }
+
+    #[setter]
+    fn set_armature(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.change(py, |joint| Ok(joint.set_armature(value)?))
     }
 
     /// Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
@@ -311,26 +357,37 @@ impl Joint {
     }
 
     /// Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
-    /// the shorter way if the joint has no limits.
+    /// the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
+    /// a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     fn set_drive(
         &self,
         py: Python<'_>,
-        target: Option<f64>,
-        velocity: Option<f64>,
+        target: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
+        let target = target.map(|value| numbers(value, "target")).transpose()?;
+        let velocity = velocity.map(|value| numbers(value, "velocity")).transpose()?;
         self.place.write(py, |inner| {
             inner.note_drives(self.place.id);
             Ok(())
         })?;
         self.change(py, |joint| {
-            let max_force = max_force.unwrap_or(joint.dof().effort);
-            let drive = drive(target, velocity, stiffness, damping, max_force)?;
-            let dof = DofSettings { drive, ..joint.dof().clone() };
-            Ok(joint.set_dof(dof)?)
+            let count = joint.kind().dofs();
+            let of_each = [&target, &velocity].into_iter().flatten().any(|numbers| !numbers.shape.is_empty());
+            for k in 0..if of_each { count } else { 1 } {
+                let settings = joint.dof_at(k).unwrap_or(joint.dof()).clone();
+                let max_force = max_force.unwrap_or(settings.effort);
+                let (target, velocity) =
+                    (number_at("target", &target, k, count)?, number_at("velocity", &velocity, k, count)?);
+                let drive = drive(target, velocity, stiffness, damping, max_force)?;
+                let dof = DofSettings { drive, ..settings };
+                if of_each { joint.set_dof_at(k, dof)? } else { joint.set_dof(dof)? }
+            }
+            Ok(())
         })
     }
 
@@ -348,10 +405,10 @@ impl Joint {
         Ok(vector(py, &self.carried()?.torque))
     }
 
-    /// Force or torque of the drive along the position, N or N·m.
+    /// Force or torque of the drive of its first degree of freedom, N or N·m.
     #[getter]
     fn drive_force(&self) -> Result<f64> {
-        Ok(self.carried()?.drive)
+        Ok(self.carried()?.drives[0])
     }
 
     /// How far it is open: distance, m, and angle, rad, without the motion that it leaves free.
@@ -362,6 +419,19 @@ impl Joint {
             let error = joint.position_error(&inner.world.view()).unwrap_or_default();
             Some((error.distance, error.angle))
         })
+    }
+}
+
+/// Returns the number for degree of freedom `k` of an argument with one number, or one for each of `count`.
+fn number_at(name: &str, given: &Option<Numbers>, k: usize, count: usize) -> Result<Option<f64>> {
+    let Some(Numbers { shape, data }) = given else { return Ok(None) };
+    match shape.as_slice() {
+        [] => Ok(data.first().copied()),
+        [n] if *n == count => Ok(data.get(k).copied()),
+        _ => Err(Error::value(format!(
+            "{name}: expected a number, or shape ({count},) with one for each degree of freedom, got {}",
+            shown(shape)
+        ))),
     }
 }
 

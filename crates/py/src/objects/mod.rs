@@ -11,6 +11,7 @@ pub mod description;
 pub mod handle;
 pub mod joint;
 pub mod joint_constants;
+pub mod joint_dof;
 pub mod joints;
 pub mod mimic;
 pub mod place;

@@ -20,15 +20,16 @@ const MAGIC: [u8; 8] = *b"tumbleD1";
 /// The drives with which objects were added, of those of which the program changed one.
 pub type Drives = BTreeMap<ObjectId, Vec<Drive>>;
 
-/// Returns the drives of an articulated body, or that of a loop joint; none of another object.
+/// Returns the drives of an articulated body or a loop joint; none of another object.
 pub fn of(world: &World, id: ObjectId) -> Vec<Drive> {
     if let Some(body) = world.get::<ArticulatedBody>(id) {
         return body.dofs().iter().map(|dof| dof.drive.clone()).collect();
     }
-    world.get::<LoopJoint>(id).map(|joint| vec![joint.dof().drive.clone()]).unwrap_or_default()
+    let Some(joint) = world.get::<LoopJoint>(id) else { return Vec::new() };
+    (0..joint.kind().dofs()).filter_map(|k| joint.dof_at(k)).map(|dof| dof.drive.clone()).collect()
 }
 
-/// Sets the drives of an articulated body, or that of a loop joint, where they differ.
+/// Sets the drives of an articulated body or a loop joint, where they differ.
 fn set(world: &mut World, id: ObjectId, drives: &[Drive]) -> Result<(), SnapshotError> {
     if of(world, id) == drives {
         return Ok(());
@@ -44,8 +45,10 @@ fn set(world: &mut World, id: ObjectId, drives: &[Drive]) -> Result<(), Snapshot
         return Ok(());
     }
     let Some(mut joint) = world.get::<LoopJoint>(id).cloned() else { return Ok(()) };
-    let drive = drives[0].clone();
-    joint.set_dof(DofSettings { drive, ..joint.dof().clone() }).map_err(|e| wrong(e.to_string()))?;
+    for (k, drive) in drives.iter().enumerate() {
+        let settings = joint.dof_at(k).cloned().unwrap_or_default();
+        joint.set_dof_at(k, DofSettings { drive: drive.clone(), ..settings }).map_err(|e| wrong(e.to_string()))?;
+    }
     world.get_mut::<LoopJoint>(id).into_iter().for_each(|known| *known = joint.clone());
     Ok(())
 }

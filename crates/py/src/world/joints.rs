@@ -5,6 +5,7 @@ use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::objects::builder::pair;
 use crate::objects::joint::Joint;
+use crate::objects::joint_dof;
 use crate::objects::joints::drive_of;
 use crate::objects::place::{Place, by_name};
 use crate::world::add::own_place;
@@ -38,6 +39,10 @@ pub struct Arguments<'a, 'py> {
     pub ground: Option<&'a Bound<'py, PyAny>>,
     pub cone: Option<f64>,
     pub max_velocity: Option<f64>,
+    pub effort: Option<f64>,
+    pub armature: f64,
+    pub twist_limits: Option<&'a Bound<'py, PyAny>>,
+    pub dofs: Option<Vec<Bound<'py, PyDict>>>,
 }
 
 /// Adds a joint and returns its handle.
@@ -45,8 +50,10 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     let kind = meaning("kind", given.kind, LoopJointKind::NAMES)?;
     let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
     let (a, b) = (a?, b?);
-    let drive = given.drive.map_or(Ok(Drive::None), |drive| drive_of(drive, f64::INFINITY))?;
-    let limits = given.limits.map(pair).transpose()?.or(given.cone.map(|cone| [0.0, cone]));
+    let effort = given.effort.unwrap_or(f64::INFINITY);
+    let drive = given.drive.map_or(Ok(Drive::None), |drive| drive_of(drive, effort))?;
+    let limits = given.limits.map(pair).transpose()?;
+    let twist_limits = given.twist_limits.map(pair).transpose()?;
     let points = [("point", given.points[0], a), ("second_point", given.points[1], b)].map(|(name, point, side)| {
         if let Some(point) = point {
             return vec3(point, name).map(Some);
@@ -65,10 +72,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     let missing = |what: &str| Err(Error::value(format!("{what}: a {} needs it", kind.name())));
     match kind {
         LoopJointKind::Spherical if given.limits.is_some() => {
-            return Err(Error::value("limits: a spherical joint has a cone"));
-        }
-        _ if kind != LoopJointKind::Spherical && given.cone.is_some() => {
-            return Err(Error::value(format!("cone: a {} joint has none", kind.name())));
+            return Err(Error::value("limits: a spherical joint has a cone and twist_limits"));
         }
         LoopJointKind::Gear if given.teeth.is_none() => return missing("teeth"),
         LoopJointKind::Rack if given.radius.is_none() => return missing("radius"),
@@ -100,15 +104,13 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
         let (damping, friction) = (given.damping, given.friction);
         let max_velocity = given.max_velocity.unwrap_or(f64::INFINITY);
-        joint.set_dof(DofSettings {
-            limits,
-            damping,
-            friction,
-            spring,
-            drive,
-            max_velocity,
-            ..DofSettings::default()
-        })?;
+        joint.set_dof(DofSettings { limits, damping, friction, spring, drive, max_velocity, effort })?;
+        joint.set_armature(given.armature)?;
+        joint.set_cone(given.cone)?;
+        joint.set_twist_limits(twist_limits)?;
+        for (k, dof) in given.dofs.iter().flatten().enumerate() {
+            joint_dof::set(&mut joint, k, dof)?;
+        }
         let [force, torque] = given.breaking.map(|most| most.unwrap_or(f64::INFINITY));
         joint.set_breaking(force, torque)?;
         let id = inner.world.add(joint)?;

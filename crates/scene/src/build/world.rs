@@ -16,7 +16,7 @@ use crate::notes::Notes;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::body::{BodySpec, MassSpec};
 use crate::parse::file::SceneFile;
-use crate::parse::loop_joint::{LoopJointSpec, PartSpec};
+use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
 use crate::parse::pair::{PairSideSpec, PairSpec};
 
 impl SceneFile {
@@ -275,12 +275,19 @@ fn with_settings(joint: LoopJoint, spec: &LoopJointSpec) -> Result<LoopJoint, Lo
         Some(length) => joint.with_length(length)?,
         None => joint,
     };
-    let mut dof = spec.dof.clone();
-    if let (LoopJointKind::Spring, Some(spring)) = (spec.kind, &mut dof.spring) {
-        spring.rest = joint.length();
+    let mut joint = joint.with_breaking_force(spec.breaking_force_n)?.with_breaking_torque(spec.breaking_torque_n_m)?;
+    for (k, LoopDofSpec { settings, armature, holds_start }) in spec.dofs.iter().enumerate() {
+        let mut dof = settings.clone();
+        if let (LoopJointKind::Spring, Some(spring)) = (spec.kind, &mut dof.spring) {
+            spring.rest = joint.length();
+        }
+        if let (true, Drive::Position { target, .. }) = (*holds_start && spec.kind.has_length(), &mut dof.drive) {
+            *target = start;
+        }
+        joint.set_dof_at(k, dof)?;
+        joint.set_armature_at(k, *armature)?;
     }
-    if let (true, Drive::Position { target, .. }) = (spec.holds_start && spec.kind.has_length(), &mut dof.drive) {
-        *target = start;
-    }
-    joint.with_dof(dof)?.with_breaking_force(spec.breaking_force_n)?.with_breaking_torque(spec.breaking_torque_n_m)
+    joint.set_cone(spec.cone_rad)?;
+    joint.set_twist_limits(spec.twist_limits_rad)?;
+    Ok(joint)
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::{Quaternion, Unit};
 use tumble_core::LoopJointKind;
-use tumble_core::articulated::DofSettings;
 use tumble_core::collide::{Pose, Vec3};
 
 use super::defaults::Item;
@@ -11,7 +10,7 @@ use super::scene::{Assembly, Place};
 use super::schema;
 use super::source::XmlNode;
 use crate::parse::joint::MimicSpec;
-use crate::parse::loop_joint::{LoopJointSpec, PartSpec};
+use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
 use crate::parse::mimic::{JointMimicSpec, JointSideSpec};
 use crate::xml::Element;
 
@@ -88,8 +87,9 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
         pitch_m: 1.0,
         ratio: 1.0,
         length_m: None,
-        dof: DofSettings::default(),
-        holds_start: false,
+        dofs: vec![LoopDofSpec::default(); kind.dofs()],
+        cone_rad: None,
+        twist_limits_rad: None,
         breaking_force_n: f64::INFINITY,
         breaking_torque_n_m: f64::INFINITY,
         enabled: true,

@@ -210,13 +210,13 @@ impl JointSpec {
         self.dof.max_velocity = f.number_or(keys.max_velocity, Bound::POSITIVE, self.dof.max_velocity);
     }
 
-    /// Reads the settings of a spherical loop joint: the half angle of its cone, damping, friction and velocity
-    /// limit.
-    pub(crate) fn read_cone(&mut self, f: &mut Fields<'_>) {
-        self.read_resistance(f, self.keys());
-        if let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) {
-            self.dof.limits = Some([0.0, cone]);
+    /// Reads the settings of a degree of freedom of a loop joint: its spring if `springs`, its armature unless it is a
+    /// length. Keys that are absent change nothing.
+    pub(crate) fn read_loop_dof(&mut self, f: &mut Fields<'_>, springs: bool, length: bool) {
+        if !length {
+            self.armature = f.number_or(self.keys().armature, Bound::NOT_NEGATIVE, self.armature);
         }
+        self.read_settings(f, springs);
     }
 
     /// Reads the cone of a spherical joint of a link, and its axis.
@@ -255,12 +255,12 @@ impl JointSpec {
         }
     }
 
-    /// Reads the settings of a joint with one degree of freedom; its spring if `springs`. Keys that are
-    /// absent change nothing.
+    /// Reads the settings of a joint with one degree of freedom, or those of a degree of freedom of a spherical one without limits;
+    /// its spring if `springs`. Keys that are absent change nothing.
     pub(crate) fn read_settings(&mut self, f: &mut Fields<'_>, springs: bool) {
         let keys = self.keys();
         self.read_resistance(f, keys);
-        if let Some(limits) = read_limits(f, keys.limits) {
+        if let Some(limits) = self.is_single().then(|| read_limits(f, keys.limits)).flatten() {
             self.dof.limits = limits;
         }
         self.dof.effort = f.number_or(keys.effort, Bound::POSITIVE, self.dof.effort);
@@ -347,7 +347,7 @@ impl JointSpec {
 }
 
 /// Reads a number in SI units or degrees, if either key is present.
-fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
+pub(crate) fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
     let given = f.optional_number(si, Bound::ANY);
     let turned = degrees.and_then(|key| f.optional_number(key, Bound::ANY)).map(f64::to_radians);
     one_of(f, (si, degrees), given, turned)
@@ -373,7 +373,7 @@ fn one_of<T>(f: &Fields<'_>, (si, degrees): Key, given: Option<T>, turned: Optio
 }
 
 /// Reads limits. `Some(None)` if the file says `false`: no limits.
-fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2]>> {
+pub(crate) fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2]>> {
     let mut read = |key: &'static str, scale: f64| {
         let value = f.value(key)?;
         if value.get_ref().as_bool() == Some(false) {

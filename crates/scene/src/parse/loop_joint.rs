@@ -7,7 +7,7 @@ use tumble_core::{Joint, LoopJointKind};
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
-use crate::parse::joint::JointSpec;
+use crate::parse::joint::{JointSpec, number, read_limits};
 use crate::parse::rotation;
 
 /// A part of an object in the description.
@@ -54,18 +54,31 @@ pub struct LoopJointSpec {
     pub pitch_m: f64,
     /// Weight of the side of `b` in the length of a pulley. Default 1.
     pub ratio: f64,
-    /// Length of a distance, a rope or a spring, m. Default: that at time 0.
+    /// Length of a distance, a rope, a spring or a pulley, m. Default: that at time 0.
     pub length_m: Option<f64>,
-    /// Limits, damping, friction, spring and drive of kinds with a position.
-    pub dof: DofSettings,
-    /// Whether a position drive without a target holds the initial position.
-    pub(crate) holds_start: bool,
+    /// Settings of its degrees of freedom, in the order of [`LoopJointKind::dofs`].
+    pub dofs: Vec<LoopDofSpec>,
+    /// Largest swing of a spherical joint, rad.
+    pub cone_rad: Option<f64>,
+    /// Limits of the twist of a spherical joint, rad.
+    pub twist_limits_rad: Option<[f64; 2]>,
     /// Force above which it breaks, N. Default infinite.
     pub breaking_force_n: f64,
     /// Torque above which it breaks, N·m. Default infinite.
     pub breaking_torque_n_m: f64,
     /// Takes part in the simulation; a broken joint does not. Default true.
     pub enabled: bool,
+}
+
+/// One degree of freedom of a loop joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoopDofSpec {
+    /// Limits, damping, friction, spring, drive, effort and velocity limit.
+    pub settings: DofSettings,
+    /// Inertia of its rotor, kg·m² or kg, at least 0.
+    pub armature: f64,
+    /// Whether a position drive without a target holds the initial position.
+    pub(crate) holds_start: bool,
 }
 
 /// Looks up the parts that a loop joint or a pair names.
@@ -114,7 +127,8 @@ impl LoopJointSpec {
             return None;
         };
         let (anchors, references) = (read_frames(&mut f, ["anchor_a", "anchor_b"]), ["reference_a", "reference_b"]);
-        let references = anchors.and_then(|_| read_frames(&mut f, references)).unwrap_or([Pose::identity(); 2]);
+        let references = anchors.and_then(|_| read_frames(&mut f, references));
+        let (referred, references) = (references.is_some(), references.unwrap_or([Pose::identity(); 2]));
         let placed = anchors.is_none();
         let b = f.optional_text("b");
         let a = match f.optional_text("a") {
@@ -131,6 +145,9 @@ impl LoopJointSpec {
         let second_axis = match kind {
             _ if !placed => None,
             LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
+            LoopJointKind::Planar | LoopJointKind::Spherical => {
+                f.optional_vector::<3>("second_axis", Bound::ANY).filter(|x| x.iter().any(|x| *x != 0.0))
+            }
             LoopJointKind::Gear => Some(f.direction_or("second_axis", axis)),
             _ => None,
         };
@@ -142,11 +159,15 @@ impl LoopJointSpec {
         let radius_m = if kind == LoopJointKind::Rack { read_not_zero(&mut f, "radius_m") } else { 1.0 };
         let pitch_m = if kind == LoopJointKind::Screw { read_not_zero(&mut f, "pitch_m") } else { 1.0 };
         let length_m = match kind.has_length() {
-            true if placed => f.optional_number("length_m", Bound::NOT_NEGATIVE),
+            true if placed || (pulley && referred) => f.optional_number("length_m", Bound::NOT_NEGATIVE),
             true => Some(f.number("length_m", Bound::NOT_NEGATIVE)),
             false => None,
         };
-        let settings = read_settings(&mut f, kind, Vec3::from(axis));
+        let spherical = kind == LoopJointKind::Spherical;
+        let cone_rad = spherical.then(|| number(&mut f, ("cone_rad", Some("cone_deg")))).flatten();
+        let twist = spherical.then(|| read_limits(&mut f, ("twist_limits_rad", Some("twist_limits_deg"))));
+        let twist_limits_rad = twist.flatten().flatten();
+        let dofs = read_dofs(&mut f, kind, Vec3::from(axis));
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
         let enabled = f.flag_or("enabled", true);
@@ -170,8 +191,9 @@ impl LoopJointSpec {
             pitch_m,
             ratio,
             length_m,
-            holds_start: settings.holds_start,
-            dof: settings.dof,
+            dofs,
+            cone_rad,
+            twist_limits_rad,
             breaking_force_n,
             breaking_torque_n_m,
             enabled,
@@ -190,19 +212,36 @@ fn read_frames(f: &mut Fields<'_>, keys: [&'static str; 2]) -> Option<[Pose; 2]>
     frames.iter().any(Option::is_some).then(|| frames.map(|frame| frame.unwrap_or_else(Pose::identity)))
 }
 
-/// Reads the settings of the position of a joint, if it has one.
-fn read_settings(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> JointSpec {
-    let mut joint = JointSpec::new("", if kind.turns() { Joint::Revolute { axis } } else { Joint::Prismatic { axis } });
+/// Reads the settings of the degrees of freedom of a joint: the keys of the joint are those of the first one, of a
+/// spherical joint those of all, and each table `dof` has those of one of them.
+fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDofSpec> {
+    let count = kind.dofs();
+    let spherical = kind == LoopJointKind::Spherical;
+    let of = |k: usize| match kind.turns_at(k) {
+        _ if spherical => JointSpec::new("", Joint::Spherical),
+        true => JointSpec::new("", Joint::Revolute { axis }),
+        false => JointSpec::new("", Joint::Prismatic { axis }),
+    };
+    let mut joints: Vec<JointSpec> = (0..count).map(of).collect();
     if kind == LoopJointKind::Spring {
         let stiffness = f.number("stiffness_n_per_m", Bound::NOT_NEGATIVE);
-        joint.dof.spring = Some(Spring { stiffness, rest: 0.0 });
+        joints[0].dof.spring = Some(Spring { stiffness, rest: 0.0 });
     }
-    match kind {
-        LoopJointKind::Spherical => joint.read_cone(f),
-        _ if kind.has_position() => joint.read_settings(f, kind != LoopJointKind::Spring),
-        _ => {}
+    let springs = kind != LoopJointKind::Spring;
+    if let Some(first) = joints.first_mut() {
+        first.read_loop_dof(f, springs, kind.has_length());
+        let first = first.clone();
+        if spherical {
+            joints.fill(first);
+        }
     }
-    joint
+    let tables = if count > 1 { f.tables("dof", count) } else { Vec::new() };
+    for (joint, mut table) in joints.iter_mut().zip(tables) {
+        joint.read_loop_dof(&mut table, springs, kind.has_length());
+        table.finish();
+    }
+    let spec = |JointSpec { dof, armature, holds_start, .. }| LoopDofSpec { settings: dof, armature, holds_start };
+    joints.into_iter().map(spec).collect()
 }
 
 /// Reads the numbers of teeth of two gears.

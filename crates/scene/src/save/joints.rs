@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use tumble_core::collide::Pose;
 use tumble_core::{
-    Anchor, ArticulatedBody, DofSettings, Joint, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, PairMaterial,
-    PairSide, Transmission,
+    Anchor, ArticulatedBody, Joint, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, PairMaterial, PairSide,
+    Transmission,
 };
 
 use super::Writer;
@@ -36,24 +36,25 @@ impl Writer<'_> {
             }
             _ => {}
         }
-        if matches!(kind, LoopJointKind::Gear | LoopJointKind::Rack) {
+        let by_references = kind == LoopJointKind::Pulley && joint.given_length().is_none();
+        if by_references || matches!(kind, LoopJointKind::Gear | LoopJointKind::Rack) {
             t.put("reference_a", pose(&references[0]));
             t.put("reference_b", pose(&references[1]));
         }
-        if kind.has_length() {
+        if kind.has_length() && !by_references {
             t.put("length_m", joint.length());
         }
-        if kind.has_position() {
-            let mut dof = joint.dof().clone();
-            if kind == LoopJointKind::Spring {
-                t.put("stiffness_n_per_m", dof.spring.map_or(0.0, |spring| spring.stiffness));
-                dof.spring = None;
-            }
-            joint.cone().iter().for_each(|cone| t.put("cone_rad", *cone));
-            dof.limits = dof.limits.filter(|_| joint.cone().is_none());
-            t.extend(dof_settings(&dof, kind.turns()));
-        } else if *joint.dof() != DofSettings::default() {
-            self.fault(format!("loop joint \"{name}\": settings of a position that it does not have"));
+        if kind == LoopJointKind::Spring {
+            t.put("stiffness_n_per_m", joint.dof().spring.map_or(0.0, |spring| spring.stiffness));
+        }
+        joint.cone().iter().for_each(|cone| t.put("cone_rad", *cone));
+        joint.twist_limits().iter().for_each(|limits| t.put("twist_limits_rad", *limits));
+        let mut dofs: Vec<Table> = (0..kind.dofs()).map(|k| loop_dof(joint, k)).collect();
+        while dofs.pop_if(|last| last.is_empty()).is_some() {}
+        match kind.dofs() {
+            1 => dofs.into_iter().for_each(|dof| t.extend(dof)),
+            _ if dofs.is_empty() => {}
+            _ => t.put("dof", dofs),
         }
         let [force, torque] = joint.breaking();
         t.put_unless(f64::INFINITY, "breaking_force_n", force);
@@ -184,6 +185,16 @@ pub(super) fn link_name(body: &ArticulatedBody, part: usize) -> Option<(&str, Po
         Some(link) => Some((body.model().links()[link].name.as_str(), Pose::identity())),
         None => body.model().frames().iter().find(|f| f.link.is_none()).map(|f| (f.name.as_str(), f.pose)),
     }
+}
+
+/// Returns the keys of a degree of freedom of a loop joint.
+fn loop_dof(joint: &LoopJoint, k: usize) -> Table {
+    let (turns, mut t) = (joint.kind().turns_at(k), Table::default());
+    let mut dof = joint.dof_at(k).cloned().unwrap_or_default();
+    dof.spring = dof.spring.filter(|_| joint.kind() != LoopJointKind::Spring);
+    t.put_unless(0.0, if turns { "armature_kg_m2" } else { "armature_kg" }, joint.armature_at(k).unwrap_or(0.0));
+    t.extend(dof_settings(&dof, turns));
+    t
 }
 
 fn pose(pose: &Pose) -> Table {

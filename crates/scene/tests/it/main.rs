@@ -14,6 +14,7 @@ mod damage;
 mod events;
 mod expansion;
 mod finding;
+mod loop_dofs;
 mod mimics;
 mod mjcf;
 mod mjcf_constraints;

@@ -321,13 +321,19 @@ fn add_joints(world: &mut World) {
         let mut joint = constants.unwrap().with_breaking_force(5e3).unwrap();
         if kind.has_position() {
             let mut dof = DofSettings { damping: 0.3, friction: 0.02, max_velocity: 9.0, ..joint.dof().clone() };
-            if *kind == LoopJointKind::Spherical {
-                dof.limits = Some([0.0, 2.5]);
-            }
             if *kind == LoopJointKind::Spring {
                 dof.spring = Some(Spring { stiffness: 20.0, rest: 0.4 });
             }
             joint.set_dof(dof).unwrap();
+        }
+        if *kind == LoopJointKind::Spherical {
+            joint.set_cone(Some(2.5)).unwrap();
+            joint.set_twist_limits(Some([-1.5, 2.0])).unwrap();
+        }
+        for dof in 1..kind.dofs() {
+            let spring = Some(Spring { stiffness: 3.0, rest: 0.1 });
+            joint.set_dof_at(dof, DofSettings { spring, effort: 4.0, ..DofSettings::default() }).unwrap();
+            joint.set_armature_at(dof, 0.2 * dof as f64).unwrap();
         }
         let id = world.add(joint).unwrap();
         world.set_enabled(id, k != 2).unwrap();

@@ -62,8 +62,8 @@ table! {
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
-    piston_time_stepping: "piston", TimeStepping, "03971f4c855a8149", "498658197dce906c";
-    piston_backtracking: "piston", Backtracking, "49b38596ba941018", "3623d35cde9a52a8";
+    piston_time_stepping: "piston", TimeStepping, "ae876d8e7e8e345e", "bc01df0546e1951d";
+    piston_backtracking: "piston", Backtracking, "cebbc368133e0eb4", "ac9f392a7dadcd1e";
     robot_time_stepping: "robot", TimeStepping, "4870548dea823eed", "32478defeba22eba";
     robot_backtracking: "robot", Backtracking, "e22a5daebf15f621", "a38fc690488cc0b0";
     skeleton_time_stepping: "skeleton", TimeStepping, "7c5c775c256c1284", "533cb39b249b8282";

@@ -36,7 +36,8 @@ pub struct JointPlace {
     pub second_point: Option<Vec3>,
     /// The z axis of both frames, of any length above 0.
     pub axis: Vec3,
-    /// The x axis of both frames, made perpendicular to `axis`; `None` for any. For a universal joint
+    /// The x axis of both frames, made perpendicular to `axis`; `None` for any. That of planar and spherical joints is by default the axis of the
+    /// world that follows, in the order x, y, z, x, the one nearest to `axis`. For a universal joint
     /// the axis that is fixed to B; for gears and racks the z axis of B, `axis` by default.
     pub second_axis: Option<Vec3>,
     /// Points of the world over which the rope of a pulley runs, m.
@@ -90,6 +91,11 @@ impl LoopJoint {
         let JointPlace { point, second_point, axis, second_axis, ground } = place;
         let second_point = second_point.unwrap_or(point);
         let own_axes = matches!(kind, LoopJointKind::Gear | LoopJointKind::Rack);
+        let next = || Vec3::ith((axis.iamax() + 1) % 3, 1.0);
+        let second_axis = match kind {
+            LoopJointKind::Planar | LoopJointKind::Spherical => Some(second_axis.unwrap_or_else(next)),
+            _ => second_axis,
+        };
         let (second_z, second_x) = if own_axes { (second_axis.unwrap_or(axis), None) } else { (axis, second_axis) };
         let directions = [Some(axis), second_axis].into_iter().flatten();
         if [point, second_point].into_iter().chain(ground).chain(directions).any(|v| v.iter().any(|x| !x.is_finite())) {
@@ -108,9 +114,7 @@ impl LoopJoint {
         }
         let joint = LoopJoint::new(name, kind, sides[0], sides[1])?;
         let mut joint = joint.with_transmission(|t| (t.references, t.ground) = (frames, ground))?;
-        if kind == LoopJointKind::Pulley {
-            joint.set_length(joint.transmission().rope_length())?;
-        } else if kind.has_length() {
+        if kind.has_length() && kind != LoopJointKind::Pulley {
             joint.set_length((points[0] - points[1]).norm())?;
         }
         Ok(joint)

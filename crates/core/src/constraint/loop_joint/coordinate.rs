@@ -38,7 +38,7 @@ impl LoopJoint {
     /// Returns its position; `None` if it has none, or makes no rows.
     pub(crate) fn joint_coordinate(&self, view: &WorldView) -> Option<JointCoordinate> {
         let pair = self.pair(view)?;
-        let coordinate = self.coordinate(&pair)?;
+        let coordinate = *self.coordinates(&pair).first()?;
         Some(JointCoordinate { pair, coordinate })
     }
 }

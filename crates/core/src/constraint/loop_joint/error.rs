@@ -27,8 +27,8 @@ pub enum LoopJointError {
     /// The axis has length 0.
     #[error("loop joint '{0}': the axis has length 0; it must have a direction")]
     Axis(String),
-    /// The two axes of a universal joint are parallel.
-    #[error("loop joint '{0}': its two axes are parallel; those of a universal joint are perpendicular")]
+    /// The two axes are parallel.
+    #[error("loop joint '{0}': its two axes are parallel; expected perpendicular ones")]
     Parallel(String),
     /// A setting is out of its range.
     #[error("loop joint '{name}': {what} is {value}; it must be {expected}")]
@@ -41,6 +41,18 @@ pub enum LoopJointError {
         value: f64,
         /// Admissible range.
         expected: &'static str,
+    },
+    /// The kind of joint has fewer degrees of freedom.
+    #[error("loop joint '{name}': there is no degree of freedom {dof}; a {kind} joint has {count}, from 0")]
+    NoDof {
+        /// Loop joint.
+        name: String,
+        /// Kind of joint.
+        kind: &'static str,
+        /// The degree of freedom that was asked for.
+        dof: usize,
+        /// Number of its degrees of freedom.
+        count: usize,
     },
     /// The kind of joint has no such setting.
     #[error("loop joint '{name}': a {kind} joint has no {what}")]

@@ -16,8 +16,8 @@ pub struct JointForce {
     pub force: Vec3,
     /// Torque on side A about A's point of the joint, N·m.
     pub torque: Vec3,
-    /// Force or torque of its drive along its position, N or N·m; positive forces increase the position.
-    pub drive: f64,
+    /// Forces or torques of the drives of its degrees of freedom, N or N·m; positive forces increase the position.
+    pub drives: [f64; 3],
 }
 
 impl LoopJoint {
@@ -29,15 +29,14 @@ impl LoopJoint {
         let Some((rows, explicit)) = self.rows_with(&pair, view.time, forces.len()) else { return sum };
         for (row, start) in rows.iter().zip(forces) {
             add(&mut sum, &row.terms, start.force);
-            if row.drives {
-                sum.drive += start.force;
+            if let Some(k) = row.drives {
+                sum.drives[k] += start.force;
             }
         }
         if explicit {
-            self.explicit_forces(&pair, |coordinate, force| {
-                let spring = self.dof.spring_force(coordinate.position);
+            self.explicit_forces(&pair, |coordinate, k, [force, drive]| {
                 add(&mut sum, &coordinate.terms, force);
-                sum.drive += force - spring + self.dof.damping * coordinate.rate;
+                sum.drives[k] += drive;
             });
         }
         sum

@@ -63,15 +63,48 @@ impl LoopJointKind {
         Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 
-    /// Returns whether it has one position: an angle, a displacement, a length, or the swing of a spherical joint.
-    pub fn has_position(self) -> bool {
+    /// Returns the number of degrees of freedom that have settings of their own: displacements of A along the axes of B's
+    /// frame before rotations, or one length.
+    ///
+    /// | kind | degrees of freedom |
+    /// |---|---|
+    /// | revolute | angle about z |
+    /// | prismatic, screw | displacement along z |
+    /// | cylindrical | displacement along z, angle about z |
+    /// | universal | angles about z of A and about x of B |
+    /// | planar | displacements along x and y of B, angle about z |
+    /// | spherical | rotations about x, y, z of B: the components of the rotation vector |
+    /// | distance, rope, spring, pulley | length |
+    /// | fixed, gear, rack | none |
+    pub fn dofs(self) -> usize {
         use LoopJointKind::*;
-        matches!(self, Revolute | Prismatic | Spherical | Cylindrical | Screw) || self.has_length()
+        match self {
+            Fixed | Gear | Rack => 0,
+            Revolute | Prismatic | Screw | Distance | Rope | Spring | Pulley => 1,
+            Cylindrical | Universal => 2,
+            Planar | Spherical => 3,
+        }
+    }
+
+    /// Returns whether degree of freedom `k` is an angle, rad, and no distance, m.
+    pub fn turns_at(self, k: usize) -> bool {
+        use LoopJointKind::*;
+        match self {
+            Revolute | Spherical | Universal => true,
+            Cylindrical => k == 1,
+            Planar => k == 2,
+            _ => false,
+        }
+    }
+
+    /// Returns whether it has a position: that of its first degree of freedom, or the swing of a spherical joint.
+    pub fn has_position(self) -> bool {
+        self.dofs() > 0
     }
 
     /// Returns whether its position is an angle, rad, and no distance, m.
     pub fn turns(self) -> bool {
-        matches!(self, LoopJointKind::Revolute | LoopJointKind::Spherical)
+        self.turns_at(0)
     }
 
     /// Returns whether its position is a length: the distance of its origins, or that of a pulley.

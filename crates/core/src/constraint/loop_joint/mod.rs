@@ -37,10 +37,21 @@
 //! rotation is exact to first order and vanishes only at the solution: the position correction
 //! reaches it in Newton steps.
 //!
-//! **Position.** Some kinds have one: the angle of A about `z_B` from `x_B`, the displacement
-//! `z_B·d`, the length `|d|`, or the swing `θ` of a spherical joint, whose limit is a cone. It has the settings of a degree of freedom ([`DofSettings`]), whose
-//! rows are those of a joint of an articulated body. A spherical joint has dry friction, damping and velocity
-//! limits about each axis of B's frame instead, and no spring or drive. Only the spring differs: with implicit rows it
+//! **Degrees of freedom.** Each one that a kind leaves free has a position with a row of its rate (`Coordinate`):
+//!
+//! ```text
+//! position                                     rate       w
+//! angle about z_B      ∠(x_B, x_A)             w·ω        z_B
+//! Cardan's angles      about z_A; about x_B    w·ω        reciprocal basis of (z_A, x_B)
+//! rotation vector r    log(R_Bᵀ·R_A), per axis w·ω        x_B, y_B, z_B           drives and springs pull along log(R_Bᵀ·R_A·R_*ᵀ)
+//! displacement         t·d,  t = x_B, y_B, z_B t·s(p_A)
+//! length               |d|                     n·ḋ
+//! swing (cone)         θ                       w·ω        n
+//! twist                2·atan2(q_z, q_w)       w·ω        (z_A + z_B)/(1 + z_A·z_B)     q = R_Bᵀ·R_A
+//! ```
+//!
+//! It has the settings of a degree of freedom ([`DofSettings`]), whose rows are those of a joint of an articulated body. A spherical joint has
+//! limits of swing and twist instead of those of its rotations. Only the spring differs: with implicit rows it
 //! is the implicit midpoint rule, which is stable at any stiffness and keeps energy,
 //!
 //! ```text
@@ -49,6 +60,13 @@
 //!
 //! with `q_f = q₀ + ½h·q̇₀`, the position in the view. Otherwise springs, damping and position drives
 //! are forces.
+//!
+//! **Armature** `I` is an inertia between the two sides along a degree of freedom: `M + JᵀIJ` instead of `M`. Bodies keep their
+//! own masses, so it is a row ([`RowTarget::inertial`]), which has the same solution:
+//!
+//! ```text
+//! λ = −I·(q̇⁺ − q̇₀)     as a soft row:    R = 1/I, target q̇₀
+//! ```
 
 mod at;
 mod coordinate;
@@ -56,6 +74,7 @@ mod error;
 mod force;
 mod kind;
 mod pair;
+mod settings;
 mod transmission;
 mod turns;
 
@@ -74,7 +93,9 @@ use crate::object::part_state::{Forces, StateRange};
 use crate::object::{Constraint, ForceGenerator, FrameState, Level, Object, RowTarget};
 use crate::world::view::{ObjectId, WorldView};
 use pair::{Coordinate, EndPair, JointRow, Motion, Term};
+use smallvec::SmallVec;
 use std::f64::consts::{PI, TAU};
+use tumble_collide::Vec3;
 
 #[cfg(test)]
 mod tests;
@@ -107,13 +128,25 @@ pub struct LoopJoint {
     kind: LoopJointKind,
     a: Anchor,
     b: Anchor,
-    dof: DofSettings,
-    length: f64,
+    /// Settings of each degree of freedom; one of default settings for kinds without any.
+    dofs: Vec<FreeDof>,
+    cone: Option<f64>,
+    twist_limits: Option<[f64; 2]>,
+    /// `None` of a pulley that has the length by default, and of kinds without a length.
+    length: Option<f64>,
     breaking_force: f64,
     breaking_torque: f64,
     transmission: Transmission,
     /// Itself in the world that it was added to.
     own: Option<ObjectId>,
+}
+
+/// The settings of a degree of freedom.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct FreeDof {
+    settings: DofSettings,
+    /// kg·m² or kg.
+    armature: f64,
 }
 
 type PartRef = Option<(ObjectId, usize)>;
@@ -150,179 +183,15 @@ impl LoopJoint {
             kind,
             a,
             b,
-            dof: DofSettings::default(),
-            length: 1.0,
+            dofs: vec![FreeDof::default(); kind.dofs().max(1)],
+            cone: None,
+            twist_limits: None,
+            length: (kind.has_length() && kind != LoopJointKind::Pulley).then_some(1.0),
             breaking_force: f64::INFINITY,
             breaking_torque: f64::INFINITY,
             transmission: Transmission::default(),
             own: None,
         })
-    }
-
-    /// Sets the constants of a gear, a rack, a screw or a pulley. The length of a pulley that was made
-    /// without one follows them: its rope is taut in the poses in which it was made.
-    ///
-    /// # Errors
-    /// [`LoopJointError::Range`] for a constant out of its range.
-    pub fn set_transmission(&mut self, transmission: Transmission) -> Result<(), LoopJointError> {
-        if let Some((what, value, expected)) = transmission.range_error() {
-            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
-        }
-        if self.kind == LoopJointKind::Pulley && self.length == self.transmission.rope_length() {
-            self.length = transmission.rope_length();
-        }
-        self.transmission = transmission;
-        Ok(())
-    }
-
-    /// Sets the teeth of two gears, the radius of a pinion, m, the pitch of a screw, m, or the ratio of a
-    /// pulley, by a change of its constants.
-    ///
-    /// # Errors
-    /// As [`set_transmission`](Self::set_transmission).
-    pub fn with_transmission(mut self, change: impl FnOnce(&mut Transmission)) -> Result<Self, LoopJointError> {
-        let mut transmission = self.transmission;
-        change(&mut transmission);
-        self.set_transmission(transmission)?;
-        Ok(self)
-    }
-
-    /// Returns the constants of a gear, a rack, a screw or a pulley.
-    pub fn transmission(&self) -> &Transmission {
-        &self.transmission
-    }
-
-    /// Sets the settings of its position: limits, damping, friction, spring and drive. Those of a
-    /// revolute joint are about an angle in (−π, π] without limits, and within π of the middle of its
-    /// limits with them; with limits more than 3π/2 apart the angle is followed from frame to frame instead, so it does not
-    /// pass its stops. A joint of a world gets other limits by [`World::change_joint`](crate::World::change_joint). The limits of a spherical joint are 0 and the half angle of a cone.
-    ///
-    /// # Errors
-    /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
-    /// without a position.
-    pub fn set_dof(&mut self, dof: DofSettings) -> Result<(), LoopJointError> {
-        if dof != DofSettings::default() && !self.kind.has_position() {
-            return Err(self.wrong_kind("limits, damping, friction, springs and drives"));
-        }
-        if self.kind == LoopJointKind::Spherical {
-            if dof.spring.is_some() || dof.drive != Drive::None {
-                return Err(self.wrong_kind("springs and drives"));
-            }
-            let lower = dof.limits.map_or(0.0, |[lo, _]| lo);
-            self.check("the lower limit of its swing", lower, lower == 0.0, "0: a cone has no lower limit")?;
-        }
-        if let Some((what, value, expected)) = dof.range_error(true) {
-            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
-        }
-        let span = dof.limits.map_or(0.0, |[lo, hi]| hi - lo);
-        if self.kind == LoopJointKind::Revolute && span > TAU {
-            return Err(LoopJointError::Range {
-                name: self.name.clone(),
-                what: "the range of its limits",
-                value: span,
-                expected: "at most 2π: its angle has no count of turns",
-            });
-        }
-        if let (LoopJointKind::Spring, Some(spring)) = (self.kind, dof.spring) {
-            self.length = spring.rest;
-        }
-        self.dof = dof;
-        Ok(())
-    }
-
-    /// Sets the length of a distance, a rope or a spring, m.
-    ///
-    /// # Errors
-    /// [`LoopJointError::Range`] for a length that is not finite and at least 0,
-    /// [`LoopJointError::Kind`] for a joint without a length.
-    pub fn set_length(&mut self, length: f64) -> Result<(), LoopJointError> {
-        if !self.kind.has_length() {
-            return Err(self.wrong_kind("length"));
-        }
-        self.check("the length", length, length.is_finite() && length >= 0.0, "finite and at least 0")?;
-        self.length = length;
-        if let (LoopJointKind::Spring, Some(spring)) = (self.kind, &mut self.dof.spring) {
-            spring.rest = length;
-        }
-        Ok(())
-    }
-
-    /// Sets the force, N, and the torque about its point, N·m, above which the joint breaks; infinite
-    /// if it does not.
-    ///
-    /// # Errors
-    /// [`LoopJointError::Range`] for a number that is not above 0.
-    pub fn set_breaking(&mut self, force: f64, torque: f64) -> Result<(), LoopJointError> {
-        self.check("the breaking force", force, force > 0.0, "above 0; infinite for none")?;
-        self.check("the breaking torque", torque, torque > 0.0, "above 0; infinite for none")?;
-        (self.breaking_force, self.breaking_torque) = (force, torque);
-        Ok(())
-    }
-
-    /// Sets the settings of its position.
-    ///
-    /// # Errors
-    /// As [`set_dof`](Self::set_dof).
-    pub fn with_dof(mut self, dof: DofSettings) -> Result<Self, LoopJointError> {
-        self.set_dof(dof)?;
-        Ok(self)
-    }
-
-    /// Sets the limits of its position, rad or m.
-    ///
-    /// # Errors
-    /// As [`set_dof`](Self::set_dof).
-    pub fn with_limits(self, limits: [f64; 2]) -> Result<Self, LoopJointError> {
-        let dof = DofSettings { limits: Some(limits), ..self.dof.clone() };
-        self.with_dof(dof)
-    }
-
-    /// Sets the largest swing of a spherical joint, rad: the half angle of a cone about the z axis of B's frame in
-    /// which the z axis of A's stays.
-    ///
-    /// # Errors
-    /// [`LoopJointError::Range`] for an angle below 0, [`LoopJointError::Kind`] for another kind.
-    pub fn with_cone(self, angle: f64) -> Result<Self, LoopJointError> {
-        match self.kind {
-            LoopJointKind::Spherical => self.with_limits([0.0, angle]),
-            _ => Err(self.wrong_kind("cone")),
-        }
-    }
-
-    /// Sets the largest speed of its position, of a spherical joint that about each axis, rad/s or m/s.
-    ///
-    /// # Errors
-    /// As [`set_dof`](Self::set_dof).
-    pub fn with_max_velocity(self, max_velocity: f64) -> Result<Self, LoopJointError> {
-        let dof = DofSettings { max_velocity, ..self.dof.clone() };
-        self.with_dof(dof)
-    }
-
-    /// Sets the length of a distance, a rope or a spring, m.
-    ///
-    /// # Errors
-    /// As [`set_length`](Self::set_length).
-    pub fn with_length(mut self, length: f64) -> Result<Self, LoopJointError> {
-        self.set_length(length)?;
-        Ok(self)
-    }
-
-    /// Sets the force above which it breaks, N.
-    ///
-    /// # Errors
-    /// As [`set_breaking`](Self::set_breaking).
-    pub fn with_breaking_force(mut self, force: f64) -> Result<Self, LoopJointError> {
-        self.set_breaking(force, self.breaking_torque)?;
-        Ok(self)
-    }
-
-    /// Sets the torque above which it breaks, N·m.
-    ///
-    /// # Errors
-    /// As [`set_breaking`](Self::set_breaking).
-    pub fn with_breaking_torque(mut self, torque: f64) -> Result<Self, LoopJointError> {
-        self.set_breaking(self.breaking_force, torque)?;
-        Ok(self)
     }
 
     /// Returns the motion that the joint leaves free.
@@ -340,47 +209,37 @@ impl LoopJoint {
         self.b = b;
     }
 
-    /// Returns the settings of its position.
-    pub fn dof(&self) -> &DofSettings {
-        &self.dof
-    }
-
-    /// Returns the largest swing of a spherical joint, rad; `None` without one.
-    pub fn cone(&self) -> Option<f64> {
-        self.dof.limits.filter(|_| self.kind == LoopJointKind::Spherical).map(|[_, cone]| cone)
-    }
-
-    /// Returns the length of a distance, a rope or a spring, m.
-    pub fn length(&self) -> f64 {
-        self.length
-    }
-
-    /// Returns the force, N, and the torque, N·m, above which it breaks.
-    pub fn breaking(&self) -> [f64; 2] {
-        [self.breaking_force, self.breaking_torque]
-    }
-
     /// Returns the deviation of the sides in a view of the world; `None` while the joint makes no
     /// rows.
     pub fn position_error(&self, view: &WorldView) -> Option<PositionError> {
         let pair = self.pair(view)?;
         let (mut distance, mut angle) = (0.0, 0.0);
-        pair.held(self.kind, self.length, &self.transmission, &mut |row| {
+        pair.held(self.kind, self.length(), &self.transmission, &mut |row| {
             let turns = row.terms.iter().flatten().all(|term| term.motion == Motion::Rotation);
             *(if turns { &mut angle } else { &mut distance }) += row.target.error.powi(2);
         });
         let mut error = PositionError { distance: distance.sqrt(), angle: angle.sqrt() };
         if matches!(self.kind, LoopJointKind::Rope | LoopJointKind::Pulley) {
-            error.distance =
-                pair.coordinate(self.kind, &self.transmission).map_or(0.0, |c| (c.position - self.length).max(0.0));
+            let first = self.coordinates(&pair).first().map(|c| (c.position - self.length()).max(0.0));
+            error.distance = first.unwrap_or_default();
         }
         Some(error)
     }
 
-    /// Returns its position, rad or m, and its rate in a view of the world; `None` if it has none, or
-    /// makes no rows.
+    /// Returns its position, rad or m, and its rate in a view of the world: those of its first degree of freedom, or of
+    /// the swing of a spherical joint. `None` if it has none, or makes no rows.
     pub fn position(&self, view: &WorldView) -> Option<[f64; 2]> {
-        let coordinate = self.coordinate(&self.pair(view)?)?;
+        if self.kind == LoopJointKind::Spherical {
+            let swing = self.pair(view)?.swing();
+            return Some([swing.position, swing.rate]);
+        }
+        self.position_at(0, view)
+    }
+
+    /// Returns the position of degree of freedom `k`, rad or m, and its rate in a view of the world; see
+    /// [`LoopJointKind::dofs`]. `None` if there is no such degree of freedom, or the joint makes no rows.
+    pub fn position_at(&self, k: usize, view: &WorldView) -> Option<[f64; 2]> {
+        let coordinate = *self.coordinates(&self.pair(view)?).get(k)?;
         Some([coordinate.position, coordinate.rate])
     }
 
@@ -388,85 +247,133 @@ impl LoopJoint {
         EndPair::of([&self.a, &self.b], view, self.middle(view))
     }
 
-    /// Returns its position with the angle of a revolute joint near its limits or its target.
-    fn coordinate(&self, pair: &EndPair) -> Option<Coordinate> {
-        let mut coordinate = pair.coordinate(self.kind, &self.transmission)?;
-        if self.kind == LoopJointKind::Revolute {
-            coordinate.position = near(coordinate.position, pair.middle);
-        }
-        Some(coordinate)
-    }
-
-    /// Returns the angle that the drive turns about: without limits it goes the shorter way.
-    fn driven(&self, position: f64) -> f64 {
-        match (&self.dof.drive, self.dof.limits, self.kind) {
-            (Drive::Position { target, .. }, None, LoopJointKind::Revolute) => near(position, *target),
-            _ => position,
-        }
-    }
-
-    fn limits(&self) -> Option<[f64; 2]> {
-        match (self.kind, self.dof.limits) {
-            (LoopJointKind::Rope | LoopJointKind::Pulley, limits) => {
-                let [lo, hi] = limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-                Some([lo, hi.min(self.length)])
+    /// Returns the positions of its degrees of freedom, with angles near the middle of their limits.
+    fn coordinates(&self, pair: &EndPair) -> SmallVec<[Coordinate; 3]> {
+        let mut all = pair.coordinates(self.kind, &self.transmission);
+        for (k, coordinate) in all.iter_mut().enumerate() {
+            let middle = match self.kind {
+                LoopJointKind::Spherical => continue,
+                LoopJointKind::Revolute => pair.middle,
+                _ => self.middle_of_limits(k),
+            };
+            if self.kind.turns_at(k) {
+                coordinate.position = near(coordinate.position, middle);
             }
-            (LoopJointKind::Spherical, Some([_, cone])) => Some([f64::NEG_INFINITY, cone]),
-            (_, limits) => limits,
+        }
+        all
+    }
+
+    /// Returns the positions that pull towards goals, of each degree of freedom: `goal + e` with the way `e` from there.
+    fn positions_from(
+        &self,
+        pair: &EndPair,
+        coordinates: &[Coordinate],
+        goal: impl Fn(&DofSettings) -> Option<f64>,
+    ) -> SmallVec<[f64; 3]> {
+        let goals: SmallVec<[Option<f64>; 3]> = self.dofs.iter().map(|dof| goal(&dof.settings)).collect();
+        if self.kind == LoopJointKind::Spherical {
+            let from = Vec3::from_fn(|k, _| goals[k].unwrap_or(0.0));
+            return (from + pair.turn_from(&from)).iter().copied().collect();
+        }
+        coordinates.iter().map(|coordinate| coordinate.position).collect()
+    }
+
+    /// Returns the positions that springs see.
+    fn sprung(&self, pair: &EndPair, coordinates: &[Coordinate]) -> SmallVec<[f64; 3]> {
+        self.positions_from(pair, coordinates, |dof| dof.spring.map(|spring| spring.rest))
+    }
+
+    /// Returns the positions that drives see: an angle without limits goes the shorter way.
+    fn driven(&self, pair: &EndPair, coordinates: &[Coordinate]) -> SmallVec<[f64; 3]> {
+        let target = |dof: &DofSettings| match &dof.drive {
+            Drive::Position { target, .. } => Some(*target),
+            _ => None,
+        };
+        let mut positions = self.positions_from(pair, coordinates, target);
+        for (k, position) in positions.iter_mut().enumerate() {
+            let settings = &self.dofs[k].settings;
+            let turns = self.kind.turns_at(k) && self.kind != LoopJointKind::Spherical && settings.limits.is_none();
+            if let (true, Some(target)) = (turns, target(settings)) {
+                *position = near(*position, target);
+            }
+        }
+        positions
+    }
+
+    /// Returns the limits of degree of freedom `k`, and the length of a rope.
+    fn limits(&self, k: usize) -> Option<[f64; 2]> {
+        let limits = self.dofs[k].settings.limits;
+        match self.kind {
+            LoopJointKind::Rope | LoopJointKind::Pulley => {
+                let [lo, hi] = limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                Some([lo, hi.min(self.length())])
+            }
+            _ => limits,
         }
     }
 
-    /// Calls `row` with all rows, in their order: held, limits, velocity limits, friction, damping, spring, drive.
+    /// Calls `act` with the one-sided rows of the limits, in their order: coordinate, sign and gap.
+    fn stops(&self, pair: &EndPair, coordinates: &[Coordinate], mut act: impl FnMut(&Coordinate, f64, f64)) {
+        let mut both = |coordinate: &Coordinate, [lo, hi]: [f64; 2]| {
+            let gaps = [(1.0, coordinate.position - lo), (-1.0, hi - coordinate.position)];
+            gaps.into_iter().filter(|(_, gap)| gap.is_finite()).for_each(|(sign, gap)| act(coordinate, sign, gap));
+        };
+        for (k, coordinate) in coordinates.iter().enumerate() {
+            self.limits(k).into_iter().for_each(|limits| both(coordinate, limits));
+        }
+        self.cone.into_iter().for_each(|cone| both(&pair.swing(), [f64::NEG_INFINITY, cone]));
+        if let Some(limits) = self.twist_limits {
+            let mut twist = pair.twist();
+            twist.position = near(twist.position, 0.5 * (limits[0] + limits[1]));
+            both(&twist, limits);
+        }
+    }
+
+    /// Returns whether it has more than the rows that hold it.
+    fn has_settings(&self) -> bool {
+        let tightens = matches!(self.kind, LoopJointKind::Rope | LoopJointKind::Pulley);
+        let free = self.dofs.iter().all(|dof| *dof == FreeDof::default());
+        tightens || !free || self.cone.is_some() || self.twist_limits.is_some()
+    }
+
+    /// Calls `row` with all rows, in their order: held, limits, and for each degree of freedom velocity limits, friction,
+    /// damping, spring, drive, armature.
     fn lay(&self, pair: &EndPair, level: Level, time: f64, row: &mut dyn FnMut(JointRow)) {
-        pair.held(self.kind, self.length, &self.transmission, row);
-        let Some(coordinate) = self.coordinate(pair) else { return };
-        for (sign, gap) in self.gaps_of(coordinate.position) {
+        pair.held(self.kind, self.length(), &self.transmission, row);
+        if !self.has_settings() {
+            return;
+        }
+        let coordinates = self.coordinates(pair);
+        self.stops(pair, &coordinates, |coordinate, sign, gap| {
             row(coordinate.row(sign, RowTarget::new(RowSet::HalfLine, gap)));
-        }
-        if self.kind == LoopJointKind::Spherical {
-            return pair.rotations().iter().for_each(|about| self.lay_resistance(about, level, row));
-        }
-        self.lay_resistance(&coordinate, level, row);
-        let Coordinate { position, rate, .. } = coordinate;
-        if let (Some(spring), Some(soft)) = (self.dof.spring.filter(|s| s.stiffness > 0.0), level.soft_step()) {
-            let h = level.h();
-            let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
-            let compliance = 4.0 / (spring.stiffness * h * h);
-            let share = level.share();
-            let target = RowTarget { velocity, compliance, share, ..RowTarget::new(RowSet::Equality, 0.0) };
-            row(coordinate.row(1.0, target));
-        }
-        if let Some(target) = self.state(&coordinate).drive(level, time) {
-            row(JointRow { drives: true, ..coordinate.row(1.0, target) });
+        });
+        let (sprung, driven) = (self.sprung(pair, &coordinates), self.driven(pair, &coordinates));
+        for (k, (coordinate, dof)) in coordinates.iter().zip(&self.dofs).enumerate() {
+            let state = DofState { q: driven[k], v: coordinate.rate, settings: &dof.settings };
+            state.velocity_limits().for_each(|(sign, target)| row(coordinate.row(sign, target)));
+            state.resistance(level, |target| row(coordinate.row(1.0, target)));
+            if let Some(target) = spring_row(&dof.settings, sprung[k], coordinate.rate, level) {
+                row(coordinate.row(1.0, target));
+            }
+            if let Some(target) = state.drive(level, time) {
+                row(JointRow { drives: Some(k), ..coordinate.row(1.0, target) });
+            }
+            if dof.armature > 0.0 {
+                row(coordinate.row(1.0, RowTarget::inertia(dof.armature)));
+            }
         }
     }
 
-    /// Calls `row` with the rows of the velocity limit, friction and damping of a coordinate.
-    fn lay_resistance(&self, coordinate: &Coordinate, level: Level, row: &mut dyn FnMut(JointRow)) {
-        let state = self.state(coordinate);
-        state.velocity_limits().for_each(|(sign, target)| row(coordinate.row(sign, target)));
-        state.resistance(level, |target| row(coordinate.row(1.0, target)));
-    }
-
-    fn state(&self, coordinate: &Coordinate) -> DofState<'_> {
-        DofState { q: self.driven(coordinate.position), v: coordinate.rate, settings: &self.dof }
-    }
-
-    fn gaps_of(&self, position: f64) -> impl Iterator<Item = (f64, f64)> + use<> {
-        let gaps = self.limits().map(|[lo, hi]| [(1.0, position - lo), (-1.0, hi - position)]);
-        gaps.into_iter().flatten().filter(|(_, gap)| gap.is_finite())
-    }
-
-    /// Calls `act` with the coordinates along which springs, damping and drives are forces and no rows, and with
-    /// these forces.
-    fn explicit_forces(&self, pair: &EndPair, mut act: impl FnMut(&Coordinate, f64)) {
-        if self.kind == LoopJointKind::Spherical {
-            return pair.rotations().iter().for_each(|about| act(about, -self.dof.damping * about.rate));
+    /// Calls `act` with the coordinates along which springs, damping and drives are forces and no rows, with the
+    /// index of the degree of freedom, and with the forces: all of them, and that of the drive.
+    fn explicit_forces(&self, pair: &EndPair, mut act: impl FnMut(&Coordinate, usize, [f64; 2])) {
+        let coordinates = self.coordinates(pair);
+        let (sprung, driven) = (self.sprung(pair, &coordinates), self.driven(pair, &coordinates));
+        for (k, (coordinate, FreeDof { settings, .. })) in coordinates.iter().zip(&self.dofs).enumerate() {
+            let resisted = settings.explicit_force(driven[k], coordinate.rate);
+            let drive = resisted + settings.damping * coordinate.rate;
+            act(coordinate, k, [settings.spring_force(sprung[k]) + resisted, drive]);
         }
-        let Some(coordinate) = self.coordinate(pair) else { return };
-        let driven = self.driven(coordinate.position);
-        let force = self.dof.spring_force(coordinate.position) + self.dof.explicit_force(driven, coordinate.rate);
-        act(&coordinate, force);
     }
 
     fn wrong_kind(&self, what: &'static str) -> LoopJointError {
@@ -479,6 +386,15 @@ impl LoopJoint {
             false => Err(LoopJointError::Range { name: self.name.clone(), what, value, expected }),
         }
     }
+}
+
+/// Returns the row of a spring at a position and a rate, if it is a row.
+fn spring_row(settings: &DofSettings, position: f64, rate: f64, level: Level) -> Option<RowTarget> {
+    let (spring, soft) = (settings.spring.filter(|s| s.stiffness > 0.0)?, level.soft_step()?);
+    let h = level.h();
+    let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
+    let compliance = 4.0 / (spring.stiffness * h * h);
+    Some(RowTarget { velocity, compliance, share: level.share(), ..RowTarget::new(RowSet::Equality, 0.0) })
 }
 
 /// Returns an angle plus the number of turns that takes it within π of `middle`.
@@ -501,7 +417,7 @@ impl Object for LoopJoint {
     }
 
     fn force(&self) -> Option<&dyn ForceGenerator> {
-        (self.dof != DofSettings::default()).then_some(self)
+        self.dofs.iter().any(|dof| *dof != FreeDof::default()).then_some(self)
     }
 }
 
@@ -517,8 +433,11 @@ impl Constraint for LoopJoint {
     }
 
     fn gaps(&self, _me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
-        let coordinate = self.limits().and_then(|_| self.coordinate(&self.pair(view)?));
-        out.extend(coordinate.into_iter().flat_map(|c| self.gaps_of(c.position)).map(|(_, gap)| gap));
+        if !self.has_settings() {
+            return;
+        }
+        let Some(pair) = self.pair(view) else { return };
+        self.stops(&pair, &self.coordinates(&pair), |_, _, gap| out.push(gap));
     }
 }
 
@@ -528,7 +447,7 @@ impl ForceGenerator for LoopJoint {
             return;
         }
         let Some(pair) = self.pair(view) else { return };
-        self.explicit_forces(&pair, |coordinate, force| {
+        self.explicit_forces(&pair, |coordinate, _, [force, _]| {
             for Term { side, motion, axis, factor } in coordinate.terms.into_iter().flatten() {
                 let end = [&pair.a, &pair.b][side];
                 let Some((id, part)) = end.part else { continue };
@@ -542,8 +461,17 @@ impl ForceGenerator for LoopJoint {
     }
 
     fn potential(&self, view: &WorldView) -> f64 {
-        let Some(spring) = self.dof.spring else { return 0.0 };
-        let coordinate = self.pair(view).and_then(|pair| self.coordinate(&pair));
-        coordinate.map_or(0.0, |c| 0.5 * spring.stiffness * (c.position - spring.rest).powi(2))
+        let Some(pair) = self.pair(view).filter(|_| self.dofs.iter().any(|dof| dof.settings.spring.is_some())) else {
+            return 0.0;
+        };
+        let springs = self.dofs.iter().map(|dof| dof.settings.spring);
+        let stretched = springs.zip(self.sprung(&pair, &self.coordinates(&pair)));
+        stretched.map(|(spring, q)| spring.map_or(0.0, |s| 0.5 * s.stiffness * (q - s.rest).powi(2))).sum()
+    }
+
+    fn kinetic(&self, view: &WorldView) -> f64 {
+        let Some(pair) = self.pair(view).filter(|_| self.dofs.iter().any(|dof| dof.armature > 0.0)) else { return 0.0 };
+        let rates = self.coordinates(&pair).into_iter().map(|coordinate| coordinate.rate);
+        self.dofs.iter().zip(rates).map(|(dof, rate)| 0.5 * dof.armature * rate * rate).sum()
     }
 }

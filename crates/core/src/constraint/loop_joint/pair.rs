@@ -8,8 +8,9 @@ use crate::object::RowTarget;
 use crate::object::part_state::PartState;
 use crate::world::view::WorldView;
 use nalgebra::RealField;
+use smallvec::{SmallVec, smallvec};
 use std::f64::consts::TAU;
-use tumble_collide::Vec3;
+use tumble_collide::{Quat, Vec3};
 
 /// Motion of one side that a row measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +39,11 @@ pub(super) type Terms = [Option<Term>; 4];
 pub(super) struct JointRow {
     pub terms: Terms,
     pub target: RowTarget,
-    /// Whether it is the row of a drive.
-    pub drives: bool,
+    /// Degree of freedom whose drive it is the row of.
+    pub drives: Option<usize>,
 }
 
-/// The one position of a joint, with the row of its rate.
+/// A position of a joint, with the row of its rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Coordinate {
     /// rad or m.
@@ -59,7 +60,7 @@ impl Coordinate {
     pub fn row(&self, sign: f64, target: RowTarget) -> JointRow {
         let target = RowTarget { bias_acceleration: sign * self.bias, ..target };
         let terms = self.terms.map(|term| term.map(|term| Term { factor: sign * term.factor, ..term }));
-        JointRow { terms, target, drives: false }
+        JointRow { terms, target, drives: None }
     }
 }
 
@@ -260,7 +261,7 @@ impl EndPair {
 
     /// Adds the row of a screw: `s − pitch·θ/2π`, within half a turn.
     fn thread(&self, by: &Transmission, row: &mut dyn FnMut(JointRow)) {
-        let (angle, along) = (self.angle(), self.displacement());
+        let (angle, along) = (self.angle(), self.displacement(2));
         let lead = by.pitch / TAU;
         let axis = self.b.axis(2);
         let [first, second, ..] = along.terms;
@@ -279,35 +280,74 @@ impl EndPair {
         })
     }
 
-    /// Returns the position that a kind leaves free, if it is one number.
-    pub fn coordinate(&self, kind: LoopJointKind, by: &Transmission) -> Option<Coordinate> {
+    /// Returns the positions that a kind leaves free, in the order of its degrees of freedom.
+    pub fn coordinates(&self, kind: LoopJointKind, by: &Transmission) -> SmallVec<[Coordinate; 3]> {
         use LoopJointKind::*;
         match kind {
-            Revolute => Some(self.angle()),
-            Prismatic | Cylindrical | Screw => Some(self.displacement()),
-            Distance | Rope | Spring => Some(self.length()),
-            Pulley => Some(self.lengths(by)),
-            Spherical => Some(self.swing()),
-            Fixed | Planar | Universal | Gear | Rack => None,
+            Revolute => smallvec![self.angle()],
+            Prismatic | Screw => smallvec![self.displacement(2)],
+            Cylindrical => smallvec![self.displacement(2), self.angle()],
+            Universal => self.cardan().into_iter().collect(),
+            Planar => smallvec![self.displacement(0), self.displacement(1), self.angle()],
+            Distance | Rope | Spring => smallvec![self.length()],
+            Pulley => smallvec![self.lengths(by)],
+            Spherical => self.rotations().into_iter().collect(),
+            Fixed | Gear | Rack => SmallVec::new(),
+        }
+    }
+
+    /// Returns a position whose rate is `w·ω`, where `w` changes by `turning` per second.
+    fn rotation_along(&self, position: f64, w: &Vec3, turning: &Vec3) -> Coordinate {
+        let omega = self.omega();
+        Coordinate {
+            position,
+            rate: w.dot(&omega),
+            terms: between([Motion::Rotation; 2], w),
+            bias: w.dot(&self.alpha()) + turning.dot(&omega),
         }
     }
 
     /// Returns the angle of A about `z_B`, in (−π, π].
     fn angle(&self) -> Coordinate {
         let (x, axis) = (self.a.axis(0), self.b.axis(2));
-        let (omega, alpha) = (self.omega(), self.alpha());
-        Coordinate {
-            position: RealField::atan2(x.dot(&self.b.axis(1)), x.dot(&self.b.axis(0))),
-            rate: axis.dot(&omega),
-            terms: between([Motion::Rotation; 2], &axis),
-            bias: axis.dot(&alpha) + self.b.part_state.angular_velocity.cross(&axis).dot(&omega),
-        }
+        let position = RealField::atan2(x.dot(&self.b.axis(1)), x.dot(&self.b.axis(0)));
+        self.rotation_along(position, &axis, &self.turning_of_b(&axis))
+    }
+
+    /// Returns the rate of a vector that is fixed to B.
+    fn turning_of_b(&self, axis: &Vec3) -> Vec3 {
+        self.b.part_state.angular_velocity.cross(axis)
+    }
+
+    /// Returns the rate of a vector that is fixed to A.
+    fn turning_of_a(&self, axis: &Vec3) -> Vec3 {
+        self.a.part_state.angular_velocity.cross(axis)
+    }
+
+    /// Returns the angles of a universal joint: of A about `z_A`, and about `x_B`, in (−π, π]. Their rates are along
+    /// the reciprocal basis of both axes.
+    fn cardan(&self) -> [Coordinate; 2] {
+        let (u, x) = (self.a.axis(2), self.b.axis(0));
+        let (u_rate, x_rate) = (self.turning_of_a(&u), self.turning_of_b(&x));
+        let (s, s_rate) = (u.dot(&x), u_rate.dot(&x) + u.dot(&x_rate));
+        let left = (1.0 - s * s).max(1e-9);
+        let reciprocal = |own: &Vec3, own_rate: &Vec3, other: &Vec3, other_rate: &Vec3| {
+            let w = own - s * other;
+            let rate = own_rate - s_rate * other - s * other_rate;
+            (w / left, rate / left + w * (2.0 * s * s_rate / (left * left)))
+        };
+        let [about_a, about_b] = [
+            RealField::atan2(-self.a.axis(1).dot(&x), self.a.axis(0).dot(&x)),
+            RealField::atan2(-u.dot(&self.b.axis(1)), u.dot(&self.b.axis(2))),
+        ];
+        let (w_a, turning_a) = reciprocal(&u, &u_rate, &x, &x_rate);
+        let (w_b, turning_b) = reciprocal(&x, &x_rate, &u, &u_rate);
+        [self.rotation_along(about_a, &w_a, &turning_a), self.rotation_along(about_b, &w_b, &turning_b)]
     }
 
     /// Returns the angle between `z_A` and `z_B`, in [0, π].
-    fn swing(&self) -> Coordinate {
+    pub fn swing(&self) -> Coordinate {
         let (u, w, omega) = (self.a.axis(2), self.b.axis(2), self.omega());
-        let (omega_a, omega_b) = (self.a.part_state.angular_velocity, self.b.part_state.angular_velocity);
         let c = w.cross(&u);
         let angle = RealField::atan2(c.norm(), w.dot(&u));
         // while they are parallel the swing grows about the axis of the rotation across them
@@ -315,31 +355,44 @@ impl EndPair {
         let (axis, turning) = match c.try_normalize(1e-9) {
             None => (across, Vec3::zeros()),
             Some(n) => {
-                let rate = omega_b.cross(&w).cross(&u) + w.cross(&omega_a.cross(&u));
+                let rate = self.turning_of_b(&w).cross(&u) + w.cross(&self.turning_of_a(&u));
                 (n, (rate - n * n.dot(&rate)) / c.norm())
             }
         };
-        Coordinate {
-            position: angle,
-            rate: axis.dot(&omega),
-            terms: between([Motion::Rotation; 2], &axis),
-            bias: axis.dot(&self.alpha()) + turning.dot(&omega),
-        }
+        self.rotation_along(angle, &axis, &turning)
     }
 
-    /// Returns the rotations of A about the axes of B's frame, as rates without positions.
-    pub fn rotations(&self) -> [Coordinate; 3] {
-        let (omega, alpha) = (self.omega(), self.alpha());
+    /// Returns the angle of A about its own `z_A` after the shortest turn of `z_B` to it, in (−π, π]. It has no
+    /// value where the axes are opposite.
+    pub fn twist(&self) -> Coordinate {
+        let (u, w) = (self.a.axis(2), self.b.axis(2));
+        let q = (self.b.frame.rotation.inverse() * self.a.frame.rotation).coords;
+        let twist = 2.0 * RealField::atan2(q.z, q.w);
+        let (u_rate, w_rate) = (self.turning_of_a(&u), self.turning_of_b(&w));
+        let left = (1.0 + u.dot(&w)).max(1e-9);
+        let turning = (u_rate + w_rate) / left - (u + w) * ((u_rate.dot(&w) + u.dot(&w_rate)) / (left * left));
+        self.rotation_along(near(twist, 0.0), &((u + w) / left), &turning)
+    }
+
+    /// Returns the rotations of A about the axes of B's frame, whose positions are the rotation vector of A in B's frame.
+    fn rotations(&self) -> [Coordinate; 3] {
+        let turn = self.turn_from(&Vec3::zeros());
         [0, 1, 2].map(|k| {
             let axis = self.b.axis(k);
-            let bias = axis.dot(&alpha) + self.b.part_state.angular_velocity.cross(&axis).dot(&omega);
-            Coordinate { position: 0.0, rate: axis.dot(&omega), terms: between([Motion::Rotation; 2], &axis), bias }
+            self.rotation_along(turn[k], &axis, &self.turning_of_b(&axis))
         })
     }
 
-    /// Returns the displacement of A's origin along `z_B`.
-    fn displacement(&self) -> Coordinate {
-        let (p, axis, state_b) = (self.a.p(), self.b.axis(2), &self.b.part_state);
+    /// Returns the rotation vector from the orientation whose rotation vector in B's frame is `from` to that of A, in
+    /// B's frame.
+    pub fn turn_from(&self, from: &Vec3) -> Vec3 {
+        let turn = self.b.frame.rotation.inverse() * self.a.frame.rotation;
+        if *from == Vec3::zeros() { turn.scaled_axis() } else { (turn * Quat::from_scaled_axis(-from)).scaled_axis() }
+    }
+
+    /// Returns the displacement of A's origin along an axis of B's frame.
+    fn displacement(&self, k: usize) -> Coordinate {
+        let (p, axis, state_b) = (self.a.p(), self.b.axis(k), &self.b.part_state);
         let rate = self.a.part_state.velocity_at(&p);
         let slip = rate - state_b.velocity_at(&p);
         let slip_rate = self.a.bias_acceleration_at(&p) - state_b.acceleration_following(&p, &rate);
@@ -410,14 +463,19 @@ fn term(side: usize, motion: Motion, axis: Vec3, factor: f64) -> Option<Term> {
     Some(Term { side, motion, axis, factor })
 }
 
-/// Returns the motion of A less that of B.
-fn between(motions: [Motion; 2], axis: &Vec3) -> Terms {
-    [term(0, motions[0], *axis, 1.0), term(1, motions[1], *axis, -1.0), None, None]
+/// Returns the motion of A less that of B, times a vector of any length.
+fn between(motions: [Motion; 2], along: &Vec3) -> Terms {
+    let (axis, length) = match along.norm() {
+        length if (length - 1.0).abs() < 1e-12 => (*along, 1.0),
+        0.0 => (Vec3::z(), 0.0),
+        length => (along / length, length),
+    };
+    [term(0, motions[0], axis, length), term(1, motions[1], axis, -length), None, None]
 }
 
 fn equality(terms: Terms, error: f64, bias: f64) -> JointRow {
     let target = RowTarget { bias_acceleration: bias, ..RowTarget::new(RowSet::Equality, error) };
-    JointRow { terms, target, drives: false }
+    JointRow { terms, target, drives: None }
 }
 
 fn translation(points: [Vec3; 2], axis: &Vec3, error: f64, bias: f64) -> JointRow {

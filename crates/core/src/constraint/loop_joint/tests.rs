@@ -281,24 +281,76 @@ fn errors_of_rotations_are_the_rotation_that_is_left() {
     }
 }
 
-#[test]
-fn the_swing_of_a_spherical_joint_has_the_rate_and_bias_of_its_row() {
+/// Checks the rows from `first` on: velocities are the rates of `errors`, and biases those of velocities.
+fn check_rates(pairing: &Pairing, joint: &LoopJoint, first: usize, errors: usize) -> RecordedRows {
     let t = 1e-5;
+    let [before, now, after] = [-t, 0.0, t].map(|t| pairing.after(t).record_loop_joint(joint));
+    for row in first..now.errors.len() {
+        if row < first + errors {
+            let rate = (after.errors[row] - before.errors[row]) / (2.0 * t);
+            let velocity = now.velocities[row];
+            assert!((rate - velocity).abs() < 1e-8, "{:?} row {row}: {velocity} {rate}", joint.kind());
+        }
+        let rate = (after.velocities[row] - before.velocities[row]) / (2.0 * t);
+        assert!((rate - now.biases[row]).abs() < 1e-7, "{:?} row {row}: {} {rate}", joint.kind(), now.biases[row]);
+    }
+    now
+}
+
+#[test]
+fn swing_and_twist_of_a_spherical_joint_have_the_rates_and_biases_of_their_rows() {
     for modes in MODES {
         let (pairing, [mut a, b]) = pairing(modes, Vec3::zeros());
-        a.frame.rotation *= Quat::from_scaled_axis(Vec3::new(0.4, -0.5, 0.3));
-        let dof = DofSettings { limits: Some([0.0, 1.5]), friction: 2.0, ..DofSettings::default() };
-        let joint = LoopJoint::new("joint", LoopJointKind::Spherical, a, b).unwrap().with_dof(dof).unwrap();
-        let [before, now, after] = [-t, 0.0, t].map(|t| pairing.after(t).record_loop_joint(&joint));
-        // three of the origin, the cone, friction about three axes
-        assert_eq!(now.errors.len(), 7);
-        let turn = Quat::from_scaled_axis(Vec3::new(0.4, -0.5, 0.3)) * Vec3::z();
-        assert!((1.5 - now.errors[3] - turn.z.acos()).abs() < 1e-12);
-        let rate = (after.errors[3] - before.errors[3]) / (2.0 * t);
-        assert!((rate - now.velocities[3]).abs() < 1e-8, "{modes:?}: {} {rate}", now.velocities[3]);
-        for row in 3..7 {
-            let rate = (after.velocities[row] - before.velocities[row]) / (2.0 * t);
-            assert!((rate - now.biases[row]).abs() < 1e-7, "{modes:?} row {row}: {} {rate}", now.biases[row]);
+        let (swing, twist) = (0.9, 0.6);
+        let tilt = Quat::from_scaled_axis(Vec3::new(0.6, -0.8, 0.0) * swing);
+        a.frame.rotation *= (tilt * Quat::from_scaled_axis(Vec3::z() * twist)).inverse();
+        let dof = DofSettings { friction: 2.0, ..DofSettings::default() };
+        let joint = LoopJoint::new("joint", LoopJointKind::Spherical, b, a).unwrap().with_dof(dof).unwrap();
+        let joint = joint.with_cone(1.5).unwrap().with_twist_limits([-1.0, 2.0]).unwrap();
+        // three of the origin, the cone, two of the twist, friction about three axes
+        let now = check_rates(&pairing, &joint, 3, 3);
+        assert_eq!(now.errors.len(), 9);
+        for (row, gap) in [(3, 1.5 - swing), (4, twist + 1.0), (5, 2.0 - twist)] {
+            assert!((now.errors[row] - gap).abs() < 1e-12, "row {row}: {}", now.errors[row]);
+        }
+    }
+}
+
+/// The positions are the numbers by which A's frame was moved, at any of them, and their rows have their rates.
+#[test]
+fn positions_of_joints_of_several_degrees_of_freedom_have_the_rates_of_their_rows() {
+    let along = |k: usize, x: f64| Pose::from_parts((Vec3::ith(k, 1.0) * x).into(), Quat::identity());
+    let about =
+        |k: usize, x: f64| Pose::from_parts(Vec3::zeros().into(), Quat::from_scaled_axis(Vec3::ith(k, 1.0) * x));
+    let cases = [
+        (LoopJointKind::Cylindrical, vec![0.4, -0.7], along(2, 0.4) * about(2, -0.7), 4),
+        (LoopJointKind::Universal, vec![0.8, -1.1], about(0, -1.1) * about(2, 0.8), 4),
+        (LoopJointKind::Planar, vec![0.3, -0.2, 1.2], along(0, 0.3) * along(1, -0.2) * about(2, 1.2), 3),
+    ];
+    for modes in MODES {
+        for (kind, positions, moved, held) in &cases {
+            let (pairing, [a, mut b]) = pairing(modes, Vec3::zeros());
+            b.frame *= moved.inverse();
+            let mut joint = LoopJoint::new("joint", *kind, a, b).unwrap();
+            for k in 0..positions.len() {
+                let dof = DofSettings { limits: Some([-2.0, 2.5]), friction: 1.0, ..DofSettings::default() };
+                joint.set_dof_at(k, dof).unwrap();
+            }
+            let now = check_rates(&pairing, &joint, *held, 2 * positions.len());
+            assert_eq!(now.errors.len(), held + 3 * positions.len());
+            for (k, q) in positions.iter().enumerate() {
+                let [below, above] = [0, 1].map(|side| now.errors[held + 2 * k + side]);
+                assert!(
+                    (below - (q + 2.0)).abs() < 1e-12 && (above - (2.5 - q)).abs() < 1e-12,
+                    "{kind:?} {k}: {below}"
+                );
+            }
+            // off the constraint too
+            let (pairing, [a, mut b]) = crate::constraint::loop_joint::tests::pairing(modes, Vec3::new(0.1, 0.2, -0.3));
+            b.frame *= moved.inverse() * about(0, 0.2) * about(1, -0.3);
+            joint = LoopJoint { a, b, ..joint };
+            let along = if *kind == LoopJointKind::Universal { 2 * positions.len() } else { 0 };
+            check_rates(&pairing, &joint, *held, along);
         }
     }
 }

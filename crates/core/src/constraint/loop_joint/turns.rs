@@ -21,12 +21,12 @@ use crate::world::view::{ObjectId, WorldView};
 use std::f64::consts::TAU;
 
 /// Distance of two limits above which the angle is followed, rad.
-const WIDE: f64 = 0.75 * TAU;
+pub(super) const WIDE: f64 = 0.75 * TAU;
 
 impl LoopJoint {
     /// Returns whether its angle is a number of the state.
     pub(crate) fn counts_turns(&self) -> bool {
-        self.kind == LoopJointKind::Revolute && self.dof.limits.is_some_and(|[lo, hi]| hi - lo > WIDE)
+        self.kind == LoopJointKind::Revolute && self.dofs[0].settings.limits.is_some_and(|[lo, hi]| hi - lo > WIDE)
     }
 
     /// Sets which object of a world it is.
@@ -36,17 +36,18 @@ impl LoopJoint {
 
     /// Returns its angle within π of the middle of its limits, rad; the middle while it makes no rows.
     pub(crate) fn first_angle(&self, view: &WorldView) -> f64 {
-        let middle = self.middle_of_limits();
+        let middle = self.middle_of_limits(0);
         self.position(view).map_or(middle, |[angle, _]| near(angle, middle))
     }
 
-    fn middle_of_limits(&self) -> f64 {
-        self.dof.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi))
+    /// Returns the middle of the limits of degree of freedom `k`; 0 without limits.
+    pub(super) fn middle_of_limits(&self, k: usize) -> f64 {
+        self.dofs[k].settings.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi))
     }
 
     /// Returns the angle within π of which that of a revolute joint is.
     pub(super) fn middle(&self, view: &WorldView) -> f64 {
-        let middle = self.middle_of_limits();
+        let middle = self.middle_of_limits(0);
         if !self.counts_turns() {
             return middle;
         }
@@ -62,7 +63,7 @@ impl FrameState for LoopJoint {
     }
 
     fn write_initial(&self, x: &mut [f64]) {
-        x.fill(self.middle_of_limits());
+        x.fill(self.middle_of_limits(0));
     }
 
     fn advance(&self, _me: &StateRange, frame: &Frame, x: &mut [f64], _out: &mut Vec<FrameImpulse>) {

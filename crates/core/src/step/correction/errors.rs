@@ -82,10 +82,11 @@ pub(super) struct Errors<'a> {
     pub tolerance: (f64, f64),
     /// The rows at the state.
     pub probe: &'a mut Workspace,
-    /// Per target: whether it is a limit with a reported gap, a joint, an active limit; and whether
+    /// Per target: whether it is a limit with a reported gap, a joint, an inertia, an active limit; and whether
     /// an active limit keeps its velocity.
     is_limit: Vec<bool>,
     is_joint: Vec<bool>,
+    is_inertial: Vec<bool>,
     active: Vec<bool>,
     keeps_velocity: Vec<bool>,
 }
@@ -105,6 +106,7 @@ impl<'a> Errors<'a> {
             probe,
             is_limit: vec![false; n],
             is_joint: work.targets.iter().map(is_joint).collect(),
+            is_inertial: work.targets.iter().map(|t| t.inertial).collect(),
             active: vec![false; n],
             keeps_velocity: vec![false; n],
         };
@@ -128,9 +130,15 @@ impl<'a> Errors<'a> {
         errors
     }
 
-    /// Returns whether a target is a joint or an active limit.
+    /// Returns whether a target is a joint, an active limit, or an inertia, which is part of the mass that corrections
+    /// move.
     pub fn measures(&self, target: usize) -> bool {
-        self.is_joint[target] || self.active[target]
+        self.is_joint[target] || self.active[target] || self.is_inertial[target]
+    }
+
+    /// Returns whether a target is an inertia.
+    pub fn is_inertial(&self, target: usize) -> bool {
+        self.is_inertial[target]
     }
 
     /// Returns whether a target is an active limit.

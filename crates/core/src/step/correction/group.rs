@@ -104,12 +104,13 @@ impl Group {
             let ranges = starts.iter().filter_map(|u| entry_at(&entries, *u));
             let large = blocks.len() > MAX_DIRECT_ROWS;
             let rows: Vec<u32> = blocks.iter().map(|b| b - contacts as u32).collect();
-            let joints: Vec<u32> = rows.iter().copied().filter(|&i| !errors.is_active(i as usize)).collect();
+            let (inertias, held): (Vec<u32>, Vec<u32>) = rows.iter().partition(|&&i| errors.is_inertial(i as usize));
+            let joints: Vec<u32> = held.iter().copied().filter(|&i| !errors.is_active(i as usize)).collect();
             Group {
                 blocks: blocks.to_vec(),
                 ranges: ranges.map(|e| (e.state_range.x.clone(), e.state_range.v.clone())).collect(),
                 left: (f64::INFINITY, f64::INFINITY),
-                chord: at_end && joints.len() == rows.len(),
+                chord: at_end && joints.len() + inertias.len() == rows.len(),
                 single_round: joints.is_empty() && errors.holds_limits(),
                 done: false,
                 rounds: match (large, at_end) {

@@ -205,9 +205,10 @@ impl Core {
                     let _ = body.set_dof(dof, settings); // a finite target, checked when the event was added
                 }
             } else if let Some(joint) = any.downcast_mut::<LoopJoint>() {
-                let mut settings = joint.dof().clone();
-                with_target(&mut settings.drive, value);
-                let _ = joint.set_dof(settings);
+                if let Some(mut settings) = joint.dof_at(dof).cloned() {
+                    with_target(&mut settings.drive, value);
+                    let _ = joint.set_dof_at(dof, settings);
+                }
             }
         }
     }
@@ -243,7 +244,7 @@ pub(super) fn drive(object: &dyn crate::object::Object, dof: usize) -> Option<&D
     if let Some(body) = any.downcast_ref::<ArticulatedBody>() {
         return body.dofs().get(dof).map(|settings| &settings.drive);
     }
-    any.downcast_ref::<LoopJoint>().filter(|_| dof == 0).map(|joint| &joint.dof().drive)
+    any.downcast_ref::<LoopJoint>().and_then(|joint| joint.dof_at(dof)).map(|settings| &settings.drive)
 }
 
 /// Returns the target of a drive that has one.

@@ -174,18 +174,20 @@ impl World {
     ///
     /// limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
     /// ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
-    /// cone: largest angle of a spherical joint between its axis on a and that on b, rad. max_velocity: largest speed
-    /// of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. breaking_force, N, and breaking_torque about the
+    /// cone: largest angle of a spherical joint between its axis on a and that on b, rad; twist_limits: (lower, upper) of its turn about that axis, rad. max_velocity: largest speed
+    /// of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. effort: the force of its motor, N·m or N, which limits drives
+    /// that name no max_force. armature: inertia of its rotor, kg·m² or kg. dofs: dicts of these settings for each degree of freedom in the order of
+    /// ``Joint.dofs``, where the joint has several; without them they are those of the first one, of a spherical joint of all three. breaking_force, N, and breaking_torque about the
     /// point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
     /// bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
     /// are in the world.
     #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
         second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None,
-        cone=None, max_velocity=None))]
+        cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None))]
     #[pyo3(
         text_signature = "($self, kind, a, b=None, point=None, axis=(0.0, 0.0, 1.0), limits=None, drive=None, breaking_force=None, *, name='', \
         second_point=None, second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, \
-        pitch=None, ratio=1.0, ground=None, cone=None, max_velocity=None)"
+        pitch=None, ratio=1.0, ground=None, cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_joint(
@@ -215,6 +217,10 @@ impl World {
         ground: Option<&Bound<'_, PyAny>>,
         cone: Option<f64>,
         max_velocity: Option<f64>,
+        effort: Option<f64>,
+        armature: f64,
+        twist_limits: Option<&Bound<'_, PyAny>>,
+        dofs: Option<Vec<Bound<'_, PyDict>>>,
     ) -> Result<Joint> {
         let given = joints::Arguments {
             kind,
@@ -237,6 +243,10 @@ impl World {
             ground,
             cone,
             max_velocity,
+            effort,
+            armature,
+            twist_limits,
+            dofs,
         };
         joints::add(&self.shared, py, &given)
     }

@@ -47,7 +47,11 @@ impl MjcfWriter<'_> {
         if !matches!(kind, LoopJointKind::Spherical | LoopJointKind::Fixed) {
             return self.note(name, format!("loop joints of the type {} are left out", kind.name()));
         }
-        if *joint.dof() != DofSettings::default() || joint.breaking() != [f64::INFINITY; 2] {
+        let settings = (0..kind.dofs()).any(|k| {
+            joint.dof_at(k).is_some_and(|dof| *dof != DofSettings::default()) || joint.armature_at(k) != Some(0.0)
+        });
+        let limits = joint.cone().is_some() || joint.twist_limits().is_some();
+        if settings || limits || joint.breaking() != [f64::INFINITY; 2] {
             self.note(name, "limits, damping and breaking loads of loop joints are left out");
         }
         let [Some(a), Some(b)] = joint.sides().map(|side| self.side(&side)) else {
