@@ -204,11 +204,11 @@ impl Core {
                     with_target(&mut settings.drive, value);
                     let _ = body.set_dof(dof, settings); // a finite target, checked when the event was added
                 }
-            } else if let Some(joint) = any.downcast_mut::<LoopJoint>() {
-                if let Some(mut settings) = joint.dof_at(dof).cloned() {
-                    with_target(&mut settings.drive, value);
-                    let _ = joint.set_dof_at(dof, settings);
-                }
+            } else if let Some(joint) = any.downcast_mut::<LoopJoint>()
+                && let Some(mut settings) = joint.dof_at(dof).cloned()
+            {
+                with_target(&mut settings.drive, value);
+                let _ = joint.set_dof_at(dof, settings);
             }
         }
     }
