@@ -1183,7 +1183,7 @@ class ArticulationBuilder:
         qd: float | None = None,
         friction: float = 0.5,
         restitution: float = 0.0,
-        collides: bool = True,
+        collidable: bool = True,
         color: ArrayLike | None = None,
         cone: float | None = None,
     ) -> None:
@@ -1206,7 +1206,7 @@ class ArticulationBuilder:
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-        start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+        start. friction, restitution, collidable: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
         between its axis, x, y or z, on the link and on the parent, rad.
         """
     def add_shape(
@@ -1216,10 +1216,10 @@ class ArticulationBuilder:
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
         *,
-        collides: bool = True,
+        collidable: bool = True,
         one_way: ArrayLike | None = None,
     ) -> None:
-        """Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+        """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
         shape that collides on one side only, as in ``World.add_rigid``.
         """
@@ -2107,6 +2107,12 @@ class World:
         budget: int | None = None,
         event_impulse: float = 0.0,
         max_turn: float = 1.0,
+        drift_tolerance: float | None = None,
+        recovery_speed: float = 3.0,
+        projection_sweeps: int = 15,
+        stabilize_positions: bool = True,
+        solver_tolerance: float = 1e-9,
+        max_relaxations: int = 20000,
     ) -> World: ...
     @staticmethod
     def load(
@@ -2302,6 +2308,66 @@ class World:
         """
     @max_turn.setter
     def max_turn(self, value: float) -> None: ...
+    @property
+    def substeps(self) -> int:
+        """Sub-steps of each step."""
+    @substeps.setter
+    def substeps(self, value: int) -> None: ...
+    @property
+    def iterations(self) -> int:
+        """Largest number of solver sweeps."""
+    @iterations.setter
+    def iterations(self, value: int) -> None: ...
+    @property
+    def max_relaxations(self) -> int:
+        """Largest number of block relaxations of a step in sweeps beyond the first 25."""
+    @max_relaxations.setter
+    def max_relaxations(self, value: int) -> None: ...
+    @property
+    def solver_tolerance(self) -> float:
+        """A sweep that changes no velocity by more than this ends a solve, m/s."""
+    @solver_tolerance.setter
+    def solver_tolerance(self, value: float) -> None: ...
+    @property
+    def projection_sweeps(self) -> int:
+        """Largest number of sweeps of the correction of overlap."""
+    @projection_sweeps.setter
+    def projection_sweeps(self, value: int) -> None: ...
+    @property
+    def stabilize_positions(self) -> bool:
+        """Whether positions of joints are corrected, and not their velocities alone."""
+    @stabilize_positions.setter
+    def stabilize_positions(self, value: bool) -> None: ...
+    @property
+    def contact_tolerance(self) -> float:
+        """Surfaces closer than this are in contact in ``"backtracking"``, m."""
+    @contact_tolerance.setter
+    def contact_tolerance(self, value: float) -> None: ...
+    @property
+    def drift_tolerance(self) -> float:
+        """Depth that a lasting contact may reach within a sub-step, m, at least ``contact_tolerance``."""
+    @drift_tolerance.setter
+    def drift_tolerance(self, value: float) -> None: ...
+    @property
+    def recovery_speed(self) -> float:
+        """Largest speed at which overlap and open joints are corrected, m/s."""
+    @recovery_speed.setter
+    def recovery_speed(self, value: float) -> None: ...
+    @property
+    def integrator_tolerance(self) -> float:
+        """Error of an inner step of ``"dormand_prince"``, m, rad, m/s and rad/s."""
+    @integrator_tolerance.setter
+    def integrator_tolerance(self, value: float) -> None: ...
+    @property
+    def sleep_after(self) -> float | None:
+        """Seconds."""
+    @sleep_after.setter
+    def sleep_after(self, value: float | None) -> None: ...
+    @property
+    def sleep_within(self) -> float:
+        """Meters."""
+    @sleep_within.setter
+    def sleep_within(self, value: float) -> None: ...
     def shape_name(self, body: int | _Body, part: int, shape: int) -> str | None:
         """Returns the name of a shape, or None if it has none, by the numbers that ``contacts`` and queries report.
 
@@ -2759,7 +2825,7 @@ class World:
         linear_drag: float = 0.0,
         quadratic_drag: float = 0.0,
         wind: ArrayLike | None = None,
-        collides: bool = True,
+        collidable: bool = True,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
         two_way: bool = False,
@@ -2776,7 +2842,7 @@ class World:
         emitters: its sources, a list of ``Emitter``. capacity: most particles that live at once. seed: of its random
         numbers. mass, kg, and radius, m, of a particle. friction, restitution: at bodies. gravity_scale: factor of
         gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
-        shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
+        shape (3,), m/s. collidable: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
         momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
         fade: seconds before its end in which a particle shrinks. opacity: share of the light from behind that the middle
         of a particle blocks, 0 to 1, or two numbers, at birth and at the end; None for solid particles. scale: factor of

@@ -80,15 +80,15 @@ impl ArticulationBuilder {
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-    /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+    /// start. friction, restitution, collidable: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
     /// between its axis, x, y or z, on the link and on the parent, rad.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None, cone=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
-        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None, cone=None)"
+        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=True, color=None, cone=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -119,7 +119,7 @@ impl ArticulationBuilder {
         qd: Option<f64>,
         friction: f64,
         restitution: f64,
-        collides: bool,
+        collidable: bool,
         color: Option<&Bound<'_, PyAny>>,
         cone: Option<f64>,
     ) -> Result<()> {
@@ -171,16 +171,16 @@ impl ArticulationBuilder {
         link = link.with_appearance(Appearance { color, ..Appearance::default() });
         link = with_mass(link, (mass, density), center_of_mass, inertia)?;
         if let Some(shape) = shape {
-            link = with_shape(link, &shape, shape_position, shape_orientation, collides)?;
+            link = with_shape(link, &shape, shape_position, shape_orientation, collidable)?;
         }
         self.change(|builder| builder.link(link));
         Ok(())
     }
 
-    /// Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+    /// Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
     /// collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
     /// shape that collides on one side only, as in ``World.add_rigid``.
-    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collides=true, one_way=None))]
+    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -188,14 +188,14 @@ impl ArticulationBuilder {
         shape: PyRef<'_, Shape>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
-        collides: bool,
+        collidable: bool,
         one_way: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         self.has(link)?;
         let direction = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         let mut builder = self.builder();
         if let Some(known) = builder.link_mut(link) {
-            let with = with_shape(known.clone(), &shape, position, orientation, collides)?;
+            let with = with_shape(known.clone(), &shape, position, orientation, collidable)?;
             *known = direction.into_iter().fold(with, LinkBuilder::with_one_way);
         }
         Ok(())
@@ -236,10 +236,10 @@ fn with_shape(
     shape: &Shape,
     position: Option<&Bound<'_, PyAny>>,
     orientation: Option<&Bound<'_, PyAny>>,
-    collides: bool,
+    collidable: bool,
 ) -> Result<LinkBuilder> {
     let (solid, pose) = (shape.solid.clone(), pose(position, orientation)? * shape.placement);
-    let link = if collides { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) };
+    let link = if collidable { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) };
     Ok(shape.name.iter().fold(link, LinkBuilder::with_shape_name))
 }
 

@@ -154,7 +154,7 @@ impl<'m> ShapeMaker<'m> {
         let mut placed = Vec::with_capacity(link.shapes.len());
         let mut lost_visual = false;
         let unused =
-            |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collides && !spec.visible;
+            |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collidable && !spec.visible;
         for spec in link.shapes.iter().filter(|spec| !unused(spec)) {
             match self.geometry(spec)? {
                 Some(geometry) => {
@@ -183,7 +183,7 @@ impl<'m> ShapeMaker<'m> {
         let as_shape = |shape| Some(VisualGeometry::Shape(shape));
         match &spec.geometry {
             Geometry::Shape(shape) => make(shape, self.meshes).map(as_shape).map_err(|e| e.to_string()),
-            Geometry::File { path, scale, .. } if !spec.collides => {
+            Geometry::File { path, scale, .. } if !spec.collidable => {
                 let key = (path.clone(), scale.map(f64::to_bits));
                 let mesh = self.visuals.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
                 Ok(Some(VisualGeometry::Mesh(mesh.clone())))

@@ -16,7 +16,8 @@ use crate::parse::rotation;
 use crate::parse::shape::{PartSurface, ShapeContext, ShapeSpec};
 use crate::parse::world::CONTACTS;
 
-const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
+pub(crate) const MODES: Names<Mode> =
+    &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
 /// Numbers of collision groups.
 pub(crate) const GROUPS: std::ops::RangeInclusive<u32> = 0..=63;
@@ -72,7 +73,7 @@ pub struct BodySpec {
     /// Rate at which angular velocity decays, 1/s. Default 0.
     pub angular_damping_per_s: f64,
     /// Takes part in contacts. Default true.
-    pub collides: bool,
+    pub collidable: bool,
     /// Collision group, 0 to 63. Default 0.
     pub group: CollisionGroup,
     /// Groups that it collides with, one bit each. Default all.
@@ -136,7 +137,7 @@ impl BodySpec {
             locked: read_all_locked(f),
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
-            collides: f.flag_or("collides", true),
+            collidable: f.flag_or("collidable", true),
             group: read_group(f, CollisionGroup::default()),
             mask: read_mask(f, u64::MAX),
             sensor: f.flag_or("sensor", false),
@@ -220,7 +221,7 @@ fn read_all_locked(f: &mut Fields<'_>) -> LockedAxes {
 }
 
 /// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.
-fn read_mode(f: &mut Fields<'_>) -> Mode {
+pub(crate) fn read_mode(f: &mut Fields<'_>) -> Mode {
     match f.value("mode") {
         Some(value) => f.as_choice("mode", value, MODES).unwrap_or(Mode::Kinematic),
         None => Mode::Dynamic,

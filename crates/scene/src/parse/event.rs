@@ -64,6 +64,8 @@ pub struct EventSpec {
     pub times: u32,
     /// `do`, in its order.
     pub actions: Vec<Action<String>>,
+    /// Whether it can fire and has an effect. Default true.
+    pub enabled: bool,
 }
 
 /// The kind of object that a name stands for.
@@ -83,6 +85,8 @@ pub(crate) enum ObjectKind {
     Template(usize),
     /// An event.
     Event,
+    /// A measuring sensor, a soft body, particles, a flock, a boid or a field.
+    Other,
 }
 
 impl ObjectKind {
@@ -189,6 +193,7 @@ impl EventSpec {
         let when = when.and_then(|fields| read_trigger(fields, names));
         let delay_s = f.number_or("delay_s", Bound::NOT_NEGATIVE, 0.0);
         let times = f.integer_or("times", 1..=u32::MAX, u32::MAX);
+        let enabled = f.flag_or("enabled", true);
         let others = when.as_ref().map(|when| (when.has_other(), !when.others().is_empty()));
         let mut actions = Vec::new();
         for fields in f.tables("do", MAX_ACTIONS) {
@@ -198,7 +203,7 @@ impl EventSpec {
             f.missing("do", "a list of what is done, such as [{ push = \"ball\", impulse_n_s = [0, 0, 1] }]");
         }
         f.finish();
-        Some(EventSpec { name, when: when?, delay_s, times, actions })
+        Some(EventSpec { name, when: when?, delay_s, times, actions, enabled })
     }
 }
 

@@ -113,7 +113,12 @@ fn read_who(
 }
 
 fn read_object(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Option<String> {
-    names.read(f, key, ObjectKind::is_object, "the name of a body, joint or event")
+    names.read(
+        f,
+        key,
+        ObjectKind::is_object,
+        "the name of a body, a joint, a sensor, a behavior, or an event above this one",
+    )
 }
 
 fn read_joint(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Option<String> {

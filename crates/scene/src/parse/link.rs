@@ -84,7 +84,7 @@ pub struct LinkShape {
     /// Surface and appearance.
     pub surface: Surface,
     /// Takes part in contacts.
-    pub collides: bool,
+    pub collidable: bool,
     /// Is drawn.
     pub visible: bool,
     /// Name, unlike those of all other shapes of the link; none for a compound, whose parts have names.
@@ -183,7 +183,7 @@ pub(crate) struct LinkRow<'a> {
 pub(crate) struct Inherited<'l, 's> {
     pub(crate) library: &'l Library<'l>,
     pub(crate) surface: &'s Surface,
-    pub(crate) collides: bool,
+    pub(crate) collidable: bool,
     pub(crate) visible: bool,
     /// Whether a link without a parent floats.
     pub(crate) floating: bool,
@@ -205,7 +205,7 @@ impl<'a> LinkRow<'a> {
             library: from.library,
             floating: from.floating,
             room: from.room,
-            collides: f.flag_or("collides", from.collides),
+            collidable: f.flag_or("collidable", from.collidable),
             visible: f.flag_or("visible", from.visible),
         };
         let shapes = read_shapes(f, &from);
@@ -312,7 +312,7 @@ impl LinkShape {
             geometry: Geometry::Shape(shape),
             mass: mass.or(density),
             surface,
-            collides: f.flag_or("collides", from.collides),
+            collidable: f.flag_or("collidable", from.collidable),
             visible: f.flag_or("visible", from.visible),
             name,
             one_way: read_direction(&mut f, "one_way"),
@@ -333,7 +333,7 @@ impl LinkShape {
         let place = f.what.clone();
         f.finish();
         let geometry = Geometry::File { path: path?, scale: [scale; 3], place, hull: false, required: true };
-        Some(LinkShape { pose, geometry, mass: None, surface, collides: false, visible, name: None, one_way: None })
+        Some(LinkShape { pose, geometry, mass: None, surface, collidable: false, visible, name: None, one_way: None })
     }
 }
 

@@ -6,7 +6,7 @@ use tumble_core::collide::{ContactMode, Pose, Shape, Vec3};
 use tumble_core::{ArticulatedBody, Collider, Joint, Object, ObjectId, Visual, VisualGeometry};
 
 use super::Writer;
-use super::bodies::inertia;
+use super::bodies::{self, inertia};
 use super::shapes::is_same;
 use super::surface;
 use super::text::Table;
@@ -28,10 +28,9 @@ impl Writer<'_> {
         t.put_unless(false, "floating", floating);
         t.put_unless(true, "self_collision", body.self_collision);
         if let Some(status) = self.world.status(id) {
+            t.put_unless("dynamic", "mode", bodies::mode(status.mode));
+            t.put_unless(true, "collidable", status.collidable);
             t.put_unless(true, "enabled", status.enabled);
-            if !status.collidable || status.mode != tumble_core::Mode::Dynamic {
-                self.fault(format!("articulated \"{name}\": a mode or collisions of the whole body"));
-            }
         }
         if let Some(root) = model.links().iter().find(|link| link.joint == Joint::Floating) {
             let rates = &state[model.positions() + root.v..model.positions() + root.v + 6];
@@ -205,7 +204,7 @@ impl Writer<'_> {
         let (mut t, center) = match &visual.geometry {
             VisualGeometry::Shape(shape) => {
                 let mut t = self.meshes.shape(shape);
-                t.put("collides", false);
+                t.put("collidable", false);
                 t.put_pose(&(frame.inverse() * visual.pose * about_frame(shape)));
                 (t, shape.center_of_mass())
             }

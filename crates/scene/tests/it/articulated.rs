@@ -66,7 +66,7 @@ fn the_example_of_every_key_means_what_it_says() {
     let mimic = link("wheel").joint.mimic.unwrap();
     assert_eq!((Some(mimic.link), mimic.multiplier), (crane.link("trolley"), 20.0));
     assert!((mimic.offset - 0.17453292519943295).abs() < 1e-16);
-    assert!(!link("wheel").shapes[0].collides);
+    assert!(!link("wheel").shapes[0].collidable);
 
     let Drive::Playback { motion, limit } = &link("lamp").joint.dof.drive else { panic!("a playback") };
     assert_eq!(*limit, 20.0);
@@ -140,7 +140,7 @@ fn wrong_joints_are_reported() {
     assert_errors(
         &link_with("limits_deg = [30, -30]"),
         &[
-            "s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; expected [lower, upper], the lower first; or false for none",
+            "s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; expected [lower, upper], the lower first, -inf and inf for none on a side; or false for none",
         ],
     );
     assert_errors(
