@@ -62,6 +62,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::joint::Joint;
     #[pymodule_export]
+    use super::objects::link::Link;
+    #[pymodule_export]
     use super::objects::mimic::Mimic;
     #[pymodule_export]
     use super::objects::sensor::{Sensor, Sensors};

@@ -377,18 +377,29 @@ impl ArticulatedBody {
 
     /// Sets collision group and mask, one bit for each group, of all its shapes.
     pub fn set_groups(&mut self, group: CollisionGroup, mask: u64) {
-        self.colliders.iter_mut().for_each(|part| (part.collider.group, part.collider.mask) = (group, mask));
+        self.change_groups(|_, _| (group, mask));
     }
 
-    /// Sets collision group and mask of the shapes of a link, and of those of the links that are fixed to it or that it is
-    /// fixed to: they are one part.
+    /// Changes collision group and mask of each of its shapes.
+    pub fn change_groups(&mut self, change: impl Fn(CollisionGroup, u64) -> (CollisionGroup, u64)) {
+        for collider in self.colliders.iter_mut().map(|part| &mut part.collider) {
+            (collider.group, collider.mask) = change(collider.group, collider.mask);
+        }
+    }
+
+    /// Changes collision group and mask of each shape of a link, and of links that are fixed to it or that it is fixed to: they
+    /// are one part.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`].
-    pub fn set_link_groups(&mut self, link: &str, group: CollisionGroup, mask: u64) -> Result<(), ArticulatedError> {
+    pub fn change_link_groups(
+        &mut self,
+        link: &str,
+        change: impl Fn(CollisionGroup, u64) -> (CollisionGroup, u64),
+    ) -> Result<(), ArticulatedError> {
         let Some(carrier) = self.model.frame(link).map(|frame| frame.link) else { return Err(self.no_link(link)) };
-        let own = self.colliders.iter_mut().filter(|part| part.link == carrier);
-        own.for_each(|part| (part.collider.group, part.collider.mask) = (group, mask));
+        let own = self.colliders.iter_mut().filter(|part| part.link == carrier).map(|part| &mut part.collider);
+        own.for_each(|collider| (collider.group, collider.mask) = change(collider.group, collider.mask));
         Ok(())
     }
 

@@ -226,9 +226,9 @@ fn groups_of_links() {
     let filters = |body: &ArticulatedBody| body.colliders().map(|(_, c)| (c.group, c.mask)).collect::<Vec<_>>();
     let all = (group(0), u64::MAX);
     assert_eq!(filters(&body), [all, (group(3), 0b11), all]);
-    body.set_link_groups("b", group(5), 0).unwrap();
+    body.change_link_groups("b", |_, _| (group(5), 0)).unwrap();
     assert_eq!(filters(&body), [all, (group(3), 0b11), (group(5), 0)]);
     body.set_groups(group(7), 6);
     assert_eq!(filters(&body), [(group(7), 6); 3]);
-    assert!(body.set_link_groups("c", group(5), 0).unwrap_err().to_string().contains("no link named 'c'"));
+    assert!(body.change_link_groups("c", |own, all| (own, all)).unwrap_err().to_string().contains("no link named 'c'"));
 }

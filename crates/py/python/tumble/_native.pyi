@@ -47,6 +47,7 @@ __all__ = [
     "HeightField",
     "Joint",
     "LinearizedStep",
+    "Link",
     "Mesh",
     "Mimic",
     "Panel",
@@ -556,6 +557,11 @@ class Sensor:
     def name(self) -> str:
         """Name, unique in its world."""
     @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
     def exists(self) -> bool:
         """Whether its world still has it."""
     @property
@@ -598,6 +604,11 @@ class SpringMesh:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -657,6 +668,11 @@ class ParticleSystem:
     def name(self) -> str:
         """Name, unique in its world."""
     @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
     def exists(self) -> bool:
         """Whether its world still has it."""
     @property
@@ -694,6 +710,11 @@ class Flock:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -743,6 +764,11 @@ class BodyFlock:
         """
     def remove(self, body: _Body) -> None:
         """Removes a body, given as a handle or by name, from the flock. It stays in the world."""
+    @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -884,6 +910,11 @@ class Template:
     def name(self) -> str:
         """Name, unique in its world."""
     @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
     def exists(self) -> bool:
         """Whether its world still has it."""
     @property
@@ -932,6 +963,11 @@ class Boid:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -1186,6 +1222,9 @@ class ArticulationBuilder:
         collidable: bool = True,
         color: ArrayLike | None = None,
         cone: float | None = None,
+        contacts: Contacts = "surface",
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1218,6 +1257,16 @@ class ArticulationBuilder:
         *,
         collidable: bool = True,
         one_way: ArrayLike | None = None,
+        sensor: bool = False,
+        mass: float | None = None,
+        density: float | None = None,
+        friction: float | None = None,
+        restitution: float | None = None,
+        contacts: Contacts | None = None,
+        group: int | None = None,
+        mask: int | Sequence[int] | None = None,
+        color: ArrayLike | None = None,
+        visible: bool = True,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
@@ -1232,6 +1281,43 @@ class ArticulationBuilder:
         change it.
         """
     def __repr__(self) -> str: ...
+
+@final
+class Link:
+    """Link."""
+    @property
+    def articulation(self) -> Articulation:
+        """Articulation."""
+    @property
+    def name(self) -> str:
+        """Name."""
+    @property
+    def mass(self) -> float:
+        """Mass."""
+    @mass.setter
+    def mass(self, value: float) -> None: ...
+    @property
+    def inertia(self) -> _Floats:
+        """Inertia."""
+    @inertia.setter
+    def inertia(self, value: ArrayLike) -> None: ...
+    @property
+    def center_of_mass(self) -> _Floats:
+        """Center."""
+    @center_of_mass.setter
+    def center_of_mass(self, value: ArrayLike) -> None: ...
+    @property
+    def group(self) -> int | None:
+        """Group."""
+    @group.setter
+    def group(self, value: int) -> None: ...
+    @property
+    def mask(self) -> int | None:
+        """Mask."""
+    @mask.setter
+    def mask(self, value: int | Sequence[int] | None) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
 
 @final
 class Articulation:
@@ -1318,6 +1404,42 @@ class Articulation:
     @property
     def mass(self) -> float:
         """Mass of all links that can move, kg."""
+    @property
+    def mode(self) -> Mode:
+        """Mode."""
+    @mode.setter
+    def mode(self, value: Mode) -> None: ...
+    @property
+    def enabled(self) -> bool:
+        """Enabled."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
+    def asleep(self) -> bool:
+        """Asleep."""
+    @property
+    def collidable(self) -> bool:
+        """Collidable."""
+    @collidable.setter
+    def collidable(self, value: bool) -> None: ...
+    @property
+    def group(self) -> int | None:
+        """Group."""
+    @group.setter
+    def group(self, value: int) -> None: ...
+    @property
+    def mask(self) -> int | None:
+        """Mask."""
+    @mask.setter
+    def mask(self, value: int | Sequence[int] | None) -> None: ...
+    @property
+    def touching(self) -> list[RigidBody | Articulation]:
+        """Touching."""
+    @property
+    def links(self) -> list[Link]:
+        """Links."""
+    def link(self, name: str) -> Link:
+        """Link."""
     @property
     def q(self) -> _Floats:
         """Positions, shape (nq,), rad and m."""

@@ -112,17 +112,6 @@ impl Joint {
         self.side(py, 1)
     }
 
-    /// Whether it acts. A joint that broke is not enabled; setting True mends it.
-    #[getter]
-    fn enabled(&self) -> Result<bool> {
-        Ok(self.place.status()?.enabled)
-    }
-
-    #[setter]
-    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
-    }
-
     /// Position, rad or m: the angle of ``a`` about the axis, its displacement along the axis, the length, or
     /// the angle between both axes of a ``"spherical"`` joint. Zero where the joint was made, except for a length. An angle is in (-π, π], or within π
     /// of the middle of its limits.

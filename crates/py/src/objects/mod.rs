@@ -2,6 +2,7 @@
 
 pub mod appearance;
 pub mod articulation;
+pub mod articulation_status;
 pub mod binding;
 pub mod bodies;
 pub mod body;
@@ -12,6 +13,7 @@ pub mod handle;
 pub mod joint;
 pub mod joint_constants;
 pub mod joints;
+pub mod link;
 pub mod mimic;
 pub mod place;
 pub mod robot;

@@ -125,6 +125,7 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
             mask: surface.mask,
             name: placed.spec.name.clone(),
             one_way: placed.spec.one_way.map(Vec3::from),
+            sensor: placed.spec.sensor,
             ..Collider::new(shape.clone(), placed.spec.pose).with_material(material)
         };
         if let Geometry::Shape(spec) = &placed.spec.geometry {

@@ -234,6 +234,7 @@ impl SceneFile {
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => body.with_mass(mass),
             Some(MassSpec::Density(density)) => body.with_density(density),
+            Some(MassSpec::Usual) => body.with_density(shape.own_density().unwrap_or(RigidBody::DEFAULT_DENSITY)),
             None => shape.own_density().into_iter().fold(body, RigidBody::with_density),
         };
         let body = spec.inertia_kg_m2.into_iter().fold(body, RigidBody::with_inertia);

@@ -154,6 +154,7 @@ pub(super) fn on_link(geom: &Geom<'_>, groups: &Groups, reader: &Reader<'_>) -> 
         visible,
         name: geom.name.clone().filter(|_| collidable),
         one_way: None,
+        sensor: false,
     };
     let mut shapes = Vec::new();
     let mut visible = geom.visible;

@@ -29,6 +29,8 @@ pub enum MassSpec {
     Mass(f64),
     /// Density, kg/m³.
     Density(f64),
+    /// The densities of the parts of a compound, and that of water, 1000 kg/m³, of other shapes.
+    Usual,
 }
 
 /// A rigid body at time 0 with all references resolved and all defaults filled in.
@@ -42,7 +44,7 @@ pub struct BodySpec {
     pub shape: ShapeSpec,
     /// Name of the shape; none for a compound, whose parts have names.
     pub shape_name: Option<String>,
-    /// Present for every dynamic body, except compounds whose parts have densities.
+    /// Present for every dynamic body.
     pub mass: Option<MassSpec>,
     /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
     /// profile may be elsewhere: at `position_m` + R·(its position in the shape).
@@ -115,7 +117,7 @@ impl BodySpec {
         let surface = PartSurface { material, contact };
         let context = ShapeContext { meshes: &library.meshes, surface: Some((library, surface)) };
         let (shape, shape_name) = ShapeSpec::read(f, context).map_or((None, None), |(shape, name)| (Some(shape), name));
-        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
+        let mass = read_mass(f, mode);
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -149,8 +151,7 @@ impl BodySpec {
             mounts: Mounts::read(f),
         };
         let shape = shape?;
-        let no_mass = mass.is_none() && !shape.has_density();
-        if (body.center_m.is_some() || body.inertia_kg_m2.is_some()) && no_mass {
+        if (body.center_m.is_some() || body.inertia_kg_m2.is_some()) && mass.is_none() {
             let message = format!("{} has `center_m` or `inertia_kg_m2` but no mass", f.what);
             f.log.report(f.span.clone(), message, "expected `mass_kg` or `density_kg_per_m3` with them");
         }
@@ -228,8 +229,8 @@ pub(crate) fn read_mode(f: &mut Fields<'_>) -> Mode {
     }
 }
 
-/// Reads the mass; a dynamic body requires it, unless its shape has densities of its own.
-fn read_mass(f: &mut Fields<'_>, mode: Mode, has_density: bool) -> Option<MassSpec> {
+/// Reads the mass; a dynamic body without one, and a compound with densities, have the usual one.
+fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
     let mass = f.optional_number("mass_kg", Bound::POSITIVE);
     let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
     match (mass, density) {
@@ -240,15 +241,7 @@ fn read_mass(f: &mut Fields<'_>, mode: Mode, has_density: bool) -> Option<MassSp
         }
         (Some(mass), None) => Some(MassSpec::Mass(mass)),
         (None, Some(density)) => Some(MassSpec::Density(density)),
-        (None, None) => {
-            if mode == Mode::Dynamic && !has_density {
-                f.missing(
-                    "mass_kg",
-                    "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
-                );
-            }
-            None
-        }
+        (None, None) => (mode == Mode::Dynamic).then_some(MassSpec::Usual),
     }
 }
 

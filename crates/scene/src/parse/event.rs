@@ -73,8 +73,8 @@ pub struct EventSpec {
 pub(crate) enum ObjectKind {
     /// A rigid body.
     Body { mode: Mode, sensor: bool },
-    /// An articulated body.
-    Articulated,
+    /// An articulated body, and whether a link of it has a sensor.
+    Articulated { sensor: bool },
     /// One of its links.
     Link,
     /// A loop joint.
@@ -91,7 +91,7 @@ pub(crate) enum ObjectKind {
 
 impl ObjectKind {
     pub(crate) fn is_body(self) -> bool {
-        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Link)
+        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Link)
     }
 
     /// Returns whether it is an object of its own, and not a part of one.
@@ -164,8 +164,9 @@ impl ObjectNames {
             if let Some(ObjectKind::Template(count)) = self.0.get(name) {
                 return body_names(name, *count).collect();
             }
-            let right =
-                |kind| matches!(kind, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Template(_));
+            let right = |kind| {
+                matches!(kind, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Template(_))
+            };
             self.check(f, key, value, name, right, EXPECTED).into_iter().collect()
         };
         match value.get_ref().as_array() {
@@ -237,8 +238,10 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             Some(Trigger::Parting { a, b })
         }
         "enters" | "leaves" => {
-            let sensor = |kind| matches!(kind, ObjectKind::Body { sensor: true, .. });
-            let sensor = names.read(&mut f, key, sensor, "the name of a body with `sensor = true`");
+            let sensor =
+                |kind| matches!(kind, ObjectKind::Body { sensor: true, .. } | ObjectKind::Articulated { sensor: true });
+            let expected = "the name of a body, or of an articulated body with a shape, that has `sensor = true`";
+            let sensor = names.read(&mut f, key, sensor, expected);
             let bodies = f.value("bodies").map_or(Vec::new(), |value| names.side(&f, "bodies", value));
             sensor.map(|sensor| match key {
                 "enters" => Trigger::Enters { sensor, bodies },

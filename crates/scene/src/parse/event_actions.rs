@@ -82,7 +82,7 @@ pub(crate) fn read_action(
         }
         "move" => read_move(&mut f, names),
         "drive" => {
-            let right = |kind| matches!(kind, ObjectKind::Link | ObjectKind::Joint | ObjectKind::Articulated);
+            let right = |kind| matches!(kind, ObjectKind::Link | ObjectKind::Joint | ObjectKind::Articulated { .. });
             let body = names.read(&mut f, "drive", right, "the name of a loop joint, or \"OBJECT/LINK\"");
             let target = read_target(&mut f);
             body.map(|body| Action::Drive { body, dof: 0, target, original: None })

@@ -351,7 +351,8 @@ fn object_names(
     let mut names = ObjectNames::default();
     bodies.iter().for_each(|body| names.add(&body.name, ObjectKind::Body { mode: body.mode, sensor: body.sensor }));
     for spec in articulated {
-        names.add(&spec.name, ObjectKind::Articulated);
+        let sensor = spec.links.iter().flat_map(|link| &link.shapes).any(|shape| shape.sensor && shape.collidable);
+        names.add(&spec.name, ObjectKind::Articulated { sensor });
         spec.links.iter().for_each(|link| names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link));
     }
     loop_joints.iter().for_each(|joint| names.add(&joint.name, ObjectKind::Joint));

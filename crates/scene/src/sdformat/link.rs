@@ -69,7 +69,8 @@ impl<'a, 'd> LinkElement<'a, 'd> {
         let surface = read_surface(&part, context);
         let name = shape_name(&part).filter(|_| collidable);
         let visible = !collidable;
-        let shape = LinkShape { pose, geometry, mass: None, surface, collidable, visible, name, one_way: None };
+        let (one_way, sensor) = (None, false);
+        let shape = LinkShape { pose, geometry, mass: None, surface, collidable, visible, name, one_way, sensor };
         if shape.geometry == Geometry::Shape(ShapeSpec::HalfSpace) {
             self.planes.push((part, shape));
         } else {

@@ -136,7 +136,17 @@ pub(super) fn read_shape(element: &Element<'_, '_>, collidable: bool, context: &
         surface.appearance.color = color;
     }
     let name = shape_name(element).filter(|_| collidable);
-    Some(LinkShape { pose, geometry, mass: None, surface, collidable, visible: !collidable, name, one_way: None })
+    Some(LinkShape {
+        pose,
+        geometry,
+        mass: None,
+        surface,
+        collidable,
+        visible: !collidable,
+        name,
+        one_way: None,
+        sensor: false,
+    })
 }
 
 fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Color> {

@@ -225,12 +225,6 @@ fn missing_keys() {
         &["s.toml:1:1: body \"b\" has no `shape`; expected a shape, such as { type = \"sphere\", radius_m = 0.5 }"],
     );
     assert_errors(
-        "[[body]]\nname = \"b\"\nshape = { type = \"sphere\", radius_m = 1 }\n",
-        &[
-            "s.toml:1:1: body \"b\" has no `mass_kg`; expected `mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
-        ],
-    );
-    assert_errors(
         "[[body]]\nmass_kg = 1\nshape = { type = \"sphere\", radius_m = 1 }\n",
         &["s.toml:1:1: body 1 has no `name`; expected a unique name"],
     );

@@ -537,7 +537,10 @@ name = "link"
 joint = "revolute"
 axis = [0, 1, 0]
 rate_rad_per_s = 0.5
-shape = { type = "sphere", radius_m = 0.1, position_m = [0, 0, -1] }
+shapes = [
+    { type = "sphere", radius_m = 0.1, position_m = [0, 0, -1] },
+    { type = "sphere", radius_m = 0.2, position_m = [0, 0, -2], name = "feeler", sensor = true, group = 3, mask = [0] },
+]
 mass_kg = 1
 
 [[sensor]]
@@ -593,6 +596,11 @@ enabled = false
 name = "start"
 when = { time_s = 0.05 }
 do = [{ enable = "gust" }]
+
+[[event]]
+name = "felt"
+when = { enters = "arm", bodies = ["ball"] }
+do = [{ disable = "ball" }]
 "#;
     let scene = SceneFile::parse(text, "s.toml").unwrap_or_else(|e| panic!("{}", e.report(false)));
     let (mut world, _) = scene.build().unwrap();
@@ -692,4 +700,40 @@ fn a_touch_sensor_may_have_a_mesh_as_its_volume() {
     let sensor = tumble_core::Sensor::new("skin", tumble_core::SensorKind::Touch, site).unwrap();
     world.add(sensor.with_volume(mesh).unwrap()).unwrap();
     with_its_text("volume", &world);
+}
+
+/// Bodies and links without a mass have the density of water, or those of the parts of a compound, as in Rust and Python.
+#[test]
+fn the_density_is_that_of_water_without_one() {
+    let cube = "{ type = \"box\", size_m = [0.1, 0.1, 0.1] }";
+    let parts =
+        "{ type = \"compound\", parts = [{ type = \"box\", size_m = [0.1, 0.1, 0.1], density_kg_per_m3 = 3000 }] }";
+    let body = |name: &str, shape: &str| format!("[[body]]\nname = \"{name}\"\nshape = {shape}\n");
+    let link = |name: &str, rest: &str| {
+        format!("[[articulated.link]]\nname = \"{name}\"\njoint = \"revolute\"\naxis = [1, 0, 0]\n{rest}\n")
+    };
+    let text = body("cube", cube)
+        + &body("parts", parts)
+        + "[[articulated]]\nname = \"arm\"\n"
+        + &link("cube", &format!("shape = {cube}"))
+        + &link("parts", &format!("shape = {parts}"))
+        + &link("mixed", &format!("shapes = [{cube}, {{ type = \"sphere\", radius_m = 0.1, mass_kg = 4 }}]"))
+        + &link("none", &format!("shape = {cube}\nmass_kg = 0\narmature_kg_m2 = 1"))
+        + "[[articulated.link]]\nname = \"fixed\"\nparent = \"none\"\njoint = \"fixed\"\n"
+        + &format!("shape = {cube}\n");
+    let scene = SceneFile::parse(&text, "s.toml").unwrap_or_else(|e| panic!("{}", e.report(false)));
+    let (world, _) = scene.build().unwrap();
+    let read = with_its_text("density", &world);
+    for world in [&world, &read] {
+        for (name, mass) in [("cube", 1.0), ("parts", 3.0)] {
+            let own = world.get::<RigidBody>(world.find(name).unwrap()).unwrap().mass();
+            assert!((own - mass).abs() < 1e-12, "{name}: {own}");
+        }
+        let arm: &ArticulatedBody = world.get(world.find("arm").unwrap()).unwrap();
+        for (name, mass) in [("cube", 1.0), ("parts", 3.0), ("mixed", 5.0), ("none", 0.0), ("fixed", 1.0)] {
+            let own = arm.link_mass(name).unwrap().mass;
+            assert!((own - mass).abs() < 1e-12, "{name}: {own}");
+        }
+        assert!((arm.model().links()[3].mass.mass - 1.0).abs() < 1e-12);
+    }
 }
