@@ -319,7 +319,9 @@ class RigidBody:
     def mode(self, value: Mode) -> None: ...
     @property
     def enabled(self) -> bool:
-        """Whether it takes part in the simulation. A disabled body keeps its state."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -527,7 +529,9 @@ class Mimic:
         """The joint that it follows: a ``Joint``, or (articulation, link); None if it was removed."""
     @property
     def enabled(self) -> bool:
-        """Whether it acts."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -558,7 +562,9 @@ class Sensor:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -606,7 +612,9 @@ class SpringMesh:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -669,7 +677,9 @@ class ParticleSystem:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -712,7 +722,9 @@ class Flock:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -766,7 +778,9 @@ class BodyFlock:
         """Removes a body, given as a handle or by name, from the flock. It stays in the world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -894,7 +908,9 @@ class ScriptedEvent:
         """Whether its world still has it."""
     @property
     def enabled(self) -> bool:
-        """Whether it can fire, and has effects."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -911,7 +927,9 @@ class Template:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -965,7 +983,9 @@ class Boid:
         """Name, unique in its world."""
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -1062,7 +1082,9 @@ class Joint:
         """The body on its second side; None for the world."""
     @property
     def enabled(self) -> bool:
-        """Whether it acts. A joint that broke is not enabled; setting True mends it."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -1245,7 +1267,7 @@ class ArticulationBuilder:
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-        start. friction, restitution, collidable: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+        start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
         between its axis, x, y or z, on the link and on the parent, rad.
         """
     def add_shape(
@@ -1270,7 +1292,11 @@ class ArticulationBuilder:
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
-        shape that collides on one side only, as in ``World.add_rigid``.
+        shape that collides on one side only, as in ``World.add_rigid``. sensor: no contacts; ``events`` reports the bodies that
+        overlap it.
+
+        mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
+        by default those of the link. visible: whether it is drawn.
         """
     def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
         """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
@@ -1284,36 +1310,51 @@ class ArticulationBuilder:
 
 @final
 class Link:
-    """Link."""
+    """A link of an articulation: its mass, and what its shapes collide with.
+
+    ``Articulation.link`` returns it, also for a fixed link. A handle without data of its own. It can be changed if the
+    articulation is in a world.
+    """
     @property
     def articulation(self) -> Articulation:
-        """Articulation."""
+        """The articulation."""
     @property
     def name(self) -> str:
-        """Name."""
+        """Name of the link."""
     @property
     def mass(self) -> float:
-        """Mass."""
+        """Mass, kg, at least 0: of the link alone, without links that are fixed to it. Setting it keeps positions and
+        velocities and changes the inertia by the same factor; that of a link that had none stays 0. The mass of a link that
+        is fixed to the base has no effect on motion.
+        """
     @mass.setter
     def mass(self, value: float) -> None: ...
     @property
     def inertia(self) -> _Floats:
-        """Inertia."""
+        """Inertia about its center of mass, axes of the link, shape (3, 3), kg·m². Setting it, also by three moments, keeps the
+        velocities.
+        """
     @inertia.setter
     def inertia(self, value: ArrayLike) -> None: ...
     @property
     def center_of_mass(self) -> _Floats:
-        """Center."""
+        """The center of mass in the frame of the link, shape (3,), meters. Setting it keeps the motion of the link; the inertia is
+        then about the new center.
+        """
     @center_of_mass.setter
     def center_of_mass(self, value: ArrayLike) -> None: ...
     @property
     def group(self) -> int | None:
-        """Group."""
+        """Collision group of its shapes, 0 to 63; None if it has none or they differ. Shapes of links that are fixed to each
+        other have it together.
+        """
     @group.setter
     def group(self, value: int) -> None: ...
     @property
     def mask(self) -> int | None:
-        """Mask."""
+        """Groups that its shapes collide with, one bit each; None if it has none or they differ. May be set to a sequence of
+        groups, or None for all.
+        """
     @mask.setter
     def mask(self, value: int | Sequence[int] | None) -> None: ...
     def __eq__(self, other: object) -> bool: ...
@@ -1406,40 +1447,50 @@ class Articulation:
         """Mass of all links that can move, kg."""
     @property
     def mode(self) -> Mode:
-        """Mode."""
+        """``"dynamic"``, ``"kinematic"`` (its joints move at their velocities, whatever it collides with) or ``"static"``, of a
+        body in a world.
+        """
     @mode.setter
     def mode(self, value: Mode) -> None: ...
     @property
     def enabled(self) -> bool:
-        """Enabled."""
+        """Whether it takes part in the simulation of its world. A disabled body keeps its state."""
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
     def asleep(self) -> bool:
-        """Asleep."""
+        """Whether it sleeps in its world: the steps leave it out until something touches it (``World(sleep_after=…)``). Any
+        change wakes it.
+        """
     @property
     def collidable(self) -> bool:
-        """Collidable."""
+        """Whether it collides in its world."""
     @collidable.setter
     def collidable(self, value: bool) -> None: ...
     @property
     def group(self) -> int | None:
-        """Group."""
+        """Collision group of its shapes, 0 to 63; None if it has no shape or they differ. Two bodies collide if the group of
+        each is in the mask of the other. Settable for a body in a world; ``Link.group`` is that of one link.
+        """
     @group.setter
     def group(self, value: int) -> None: ...
     @property
     def mask(self) -> int | None:
-        """Mask."""
+        """Groups that its shapes collide with, one bit each; None if it has no shape or they differ. May be set, for a body in a
+        world, to a sequence of groups, or None for all.
+        """
     @mask.setter
     def mask(self, value: int | Sequence[int] | None) -> None: ...
     @property
     def touching(self) -> list[RigidBody | Articulation]:
-        """Touching."""
+        """The bodies in contact with it after the last step, or in a sensor of it: a list of handles in the order of
+        ``world.bodies``.
+        """
     @property
     def links(self) -> list[Link]:
-        """Links."""
+        """All links, including fixed ones, in the order of ``link_names``."""
     def link(self, name: str) -> Link:
-        """Link."""
+        """Returns a link by name, which may be a fixed one."""
     @property
     def q(self) -> _Floats:
         """Positions, shape (nq,), rad and m."""
@@ -2204,6 +2255,10 @@ class World:
     as many as cores; no number changes the result. budget: largest work of a step in block
     relaxations, None for no bound. event_impulse: N·s, see ``events``. max_turn: largest angle, rad, by
     which forces of joints may turn a part back and forth in a sub-step; frames are divided so that they do not.
+    drift_tolerance: meters, None: 1e-4, or contact_tolerance if that is larger. recovery_speed: at which overlap is
+    corrected, m/s. projection_sweeps: largest number of sweeps of that correction. stabilize_positions: whether
+    positions of joints are corrected. solver_tolerance: a sweep that changes no velocity by more than this ends a
+    solve, m/s. max_relaxations: largest number of block relaxations of a step in sweeps beyond the first 25.
     Names and defaults are those of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
@@ -2482,12 +2537,14 @@ class World:
     def integrator_tolerance(self, value: float) -> None: ...
     @property
     def sleep_after(self) -> float | None:
-        """Seconds."""
+        """Seconds after which islands that moved by less than ``sleep_within`` sleep until something touches them; None:
+        never.
+        """
     @sleep_after.setter
     def sleep_after(self, value: float | None) -> None: ...
     @property
     def sleep_within(self) -> float:
-        """Meters."""
+        """Largest displacement of any point of an island at rest during ``sleep_after``, m. Settable while that is not None."""
     @sleep_within.setter
     def sleep_within(self, value: float) -> None: ...
     def shape_name(self, body: int | _Body, part: int, shape: int) -> str | None:
