@@ -202,9 +202,8 @@ impl Writer<'_> {
         if let Some(reference) = sensor.reference() {
             self.site(reference).0.iter().for_each(|part| t.put("relative_to", part));
         }
-        match sensor.volume() {
-            Some(volume) => t.put("volume", self.meshes.shape(volume)),
-            None => {}
+        if let Some(volume) = sensor.volume() {
+            t.put("volume", self.meshes.shape(volume));
         }
         t.put_unless(f64::INFINITY, "cutoff", sensor.cutoff());
         if sensor.kind().is_camera() {
