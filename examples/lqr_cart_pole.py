@@ -9,7 +9,7 @@ import tumble
 
 SCENE = """
 world = { dt_s = 0.01 }
-articulated = [{ name = "cart_pole", collides = false, link = [
+articulated = [{ name = "cart_pole", collidable = false, link = [
     { name = "cart", joint = "prismatic", axis = [1, 0, 0], mass_kg = 1.0, center_m = [0, 0, 0], inertia_kg_m2 = [0.01, 0.01, 0.01] },
     { name = "pole", parent = "cart", joint = "revolute", axis = [0, 1, 0], mass_kg = 0.1, center_m = [0, 0, 0.5],
       inertia_kg_m2 = [0.00833, 0.00833, 0.00001] },

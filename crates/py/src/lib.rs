@@ -64,6 +64,8 @@ mod _native {
     #[pymodule_export]
     use super::objects::joint_dof::JointDof;
     #[pymodule_export]
+    use super::objects::link::Link;
+    #[pymodule_export]
     use super::objects::mimic::Mimic;
     #[pymodule_export]
     use super::objects::sensor::{Sensor, Sensors};

@@ -9,7 +9,7 @@ import tumble
 def test_a_pendulum_is_its_closed_form_to_first_order():
     world = tumble.World(dt=1e-4)
     pole = tumble.World.parse(
-        """articulated = [{ name = "pole", collides = false, link = [{ name = "rod", joint = "revolute", axis = [0, 1, 0],
+        """articulated = [{ name = "pole", collidable = false, link = [{ name = "rod", joint = "revolute", axis = [0, 1, 0],
            mass_kg = 2, center_m = [0, 0, -0.5], inertia_kg_m2 = [0.01, 0.01, 0.01] }] }]
            world = { dt_s = 0.0001 }"""
     )

@@ -43,7 +43,7 @@ def test_a_jelly_rests_on_the_floor(world):
 
 def test_particles_are_born_fly_and_end(world):
     jet = tumble.Emitter((0, 0, 1), half_angle=0, speed=3, lifetime=0.5, rate=250)
-    system = world.add_particles("jet", [jet], capacity=500, collides=False)
+    system = world.add_particles("jet", [jet], capacity=500, collidable=False)
     world.step(60)
     assert len(system) == 62
     assert system.positions[:, 2].max() <= 1 + 3**2 / (2 * G) + 1e-9
@@ -58,7 +58,7 @@ def test_particles_are_born_fly_and_end(world):
 
 def test_an_emitter_rides_on_a_body(world):
     cart = world.add_rigid("cart", tumble.Sphere(0.1), mass=1, velocity=(2, 0, 0), gravity_scale=0)
-    drops = world.add_particles("drops", [tumble.Emitter(body=cart, burst=10, speed=0)], collides=False)
+    drops = world.add_particles("drops", [tumble.Emitter(body=cart, burst=10, speed=0)], collidable=False)
     world.step(1)
     np.testing.assert_allclose(drops.velocities[:, 0], 2, atol=1e-12)
 
@@ -199,7 +199,7 @@ def test_they_are_drawn(world):
     # a sheet of 1 m at 4 m, of a picture that shows 2·4·tan 20° = 2.91 m in 120 rows
     assert changed.sum() == pytest.approx((120 / 2.91) ** 2, rel=0.05)
     world.remove("cloth")
-    system = world.add_particles("dot", drawn_radius=0.3, collides=False)
+    system = world.add_particles("dot", drawn_radius=0.3, collidable=False)
     system.spawn((0, 0, 1))
     changed = np.abs(picture() - empty).max(axis=2) > 20
     assert changed.sum() == pytest.approx(math.pi * (0.3 * 120 / 2.91) ** 2, rel=0.1)
@@ -214,7 +214,7 @@ def test_a_transparent_particle_blends_with_what_is_behind(world):
         return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
     behind = middle()
-    smoke = world.add_particles("smoke", drawn_radius=0.3, collides=False, color=(1, 0, 0), glow=True, opacity=(0.8, 0.4), end_color=(0, 0, 1))
+    smoke = world.add_particles("smoke", drawn_radius=0.3, collidable=False, color=(1, 0, 0), glow=True, opacity=(0.8, 0.4), end_color=(0, 0, 1))
     smoke.spawn((0, 0, 1), life=2)
     np.testing.assert_array_equal(smoke.lifetimes, [2])
     np.testing.assert_allclose(middle(), 0.8 * np.array([1, 0, 0]) + 0.2 * behind, atol=0.012)

@@ -71,7 +71,7 @@ pub struct ParticleSettings {
     /// Velocity of the air, m/s.
     pub wind: Vec3,
     /// Whether particles collide with bodies.
-    pub collides: bool,
+    pub collidable: bool,
     /// Collision group, and the groups that particles collide with.
     pub group: CollisionGroup,
     /// One bit per group.
@@ -94,7 +94,7 @@ impl Default for ParticleSettings {
             linear_drag: 0.0,
             quadratic_drag: 0.0,
             wind: Vec3::zeros(),
-            collides: true,
+            collidable: true,
             group: CollisionGroup::default(),
             mask: u64::MAX,
             two_way: false,
@@ -277,7 +277,7 @@ impl FrameState for ParticleSystem {
 
     fn advance(&self, _me: &StateRange, frame: &Frame, x: &mut [f64], out: &mut Vec<FrameImpulse>) {
         let s = &self.settings;
-        let mask = if s.collides { s.mask } else { 0 };
+        let mask = if s.collidable { s.mask } else { 0 };
         let obstacles = Obstacles::new(frame, s.radius, s.group, mask);
         let gravity = s.gravity_scale * frame.view.gravity;
         let air = Air::new(gravity, s.wind, [s.linear_drag, s.quadratic_drag], frame.dt);

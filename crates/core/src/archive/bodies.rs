@@ -108,11 +108,13 @@ struct ColliderRecord {
     name: Option<String>,
     shape_materials: ShapeMaterials,
     one_way: Option<Vec3>,
+    sensor: bool,
 }
 
 impl ColliderRecord {
     fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
-        let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way } = collider;
+        let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way, sensor } =
+            collider;
         ColliderRecord {
             link,
             pose: *pose,
@@ -124,6 +126,7 @@ impl ColliderRecord {
             name: name.clone(),
             shape_materials: shape_materials.clone(),
             one_way: *one_way,
+            sensor: *sensor,
         }
     }
 
@@ -139,9 +142,13 @@ impl ColliderRecord {
             name,
             shape_materials,
             one_way,
+            sensor,
         } = self;
         let shape = shape(&tables.shapes, index)?;
-        Ok((link, Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way }))
+        Ok((
+            link,
+            Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way, sensor },
+        ))
     }
 }
 

@@ -14,8 +14,10 @@
 use super::collider::{Collider, LinkCollider};
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::algorithms::free_motion::FreeMotion;
+use crate::articulated::model::LinkMass;
 use crate::articulated::model::dof::{Coupling, DofSettings};
 use crate::articulated::model::{Model, ModelError};
+use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::part_state::Wrench;
 use crate::object::visual::Visual;
@@ -350,6 +352,55 @@ impl ArticulatedBody {
             Ok(()) => Ok(self),
             Err(why) => Err(ArticulatedError::Model { body: self.name, why }),
         }
+    }
+
+    /// Returns mass, center of mass and inertia of a link alone, in its own frame: without those of links that are fixed to
+    /// it. A [`Link`](super::Link) has those of all of them together.
+    pub fn link_mass(&self, link: &str) -> Option<LinkMass> {
+        self.model.frame(link).map(|frame| frame.mass)
+    }
+
+    /// Sets mass, center of mass and inertia of a link alone, in its own frame. In a world
+    /// [`World::set_link_mass`](crate::World::set_link_mass) does it.
+    ///
+    /// # Errors
+    /// [`ArticulatedError`]: there is no such link, a number is out of its range, or a joint then moves no inertia.
+    pub fn with_link_mass(mut self, link: &str, mass: LinkMass) -> Result<Self, ArticulatedError> {
+        let Some(frame) = self.model.frames().iter().position(|frame| frame.name == link) else {
+            return Err(self.no_link(link));
+        };
+        match self.model.set_mass(frame, mass) {
+            Ok(()) => Ok(self),
+            Err(why) => Err(ArticulatedError::Model { body: self.name, why }),
+        }
+    }
+
+    /// Sets collision group and mask, one bit for each group, of all its shapes.
+    pub fn set_groups(&mut self, group: CollisionGroup, mask: u64) {
+        self.change_groups(|_, _| (group, mask));
+    }
+
+    /// Changes collision group and mask of each of its shapes.
+    pub fn change_groups(&mut self, change: impl Fn(CollisionGroup, u64) -> (CollisionGroup, u64)) {
+        for collider in self.colliders.iter_mut().map(|part| &mut part.collider) {
+            (collider.group, collider.mask) = change(collider.group, collider.mask);
+        }
+    }
+
+    /// Changes collision group and mask of each shape of a link, and of links that are fixed to it or that it is fixed to: they
+    /// are one part.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
+    pub fn change_link_groups(
+        &mut self,
+        link: &str,
+        change: impl Fn(CollisionGroup, u64) -> (CollisionGroup, u64),
+    ) -> Result<(), ArticulatedError> {
+        let Some(carrier) = self.model.frame(link).map(|frame| frame.link) else { return Err(self.no_link(link)) };
+        let own = self.colliders.iter_mut().filter(|part| part.link == carrier).map(|part| &mut part.collider);
+        own.for_each(|collider| (collider.group, collider.mask) = change(collider.group, collider.mask));
+        Ok(())
     }
 
     /// Couples one degree of freedom to another.

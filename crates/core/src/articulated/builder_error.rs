@@ -40,6 +40,16 @@ pub enum ArticulationError {
         /// Link.
         link: String,
     },
+    /// A link and a shape of it have masses.
+    #[error(
+        "articulated body '{body}', link '{link}': it has a mass, and a shape of it has one too; give a mass to the link, or masses or densities to its shapes"
+    )]
+    TwoMasses {
+        /// Body.
+        body: String,
+        /// Link.
+        link: String,
+    },
     /// A setting does not fit the joint of a link.
     #[error("articulated body '{body}', link '{link}': {what}, and its joint has {dof} degrees of freedom")]
     Joint {

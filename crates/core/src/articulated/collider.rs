@@ -28,6 +28,9 @@ pub struct Collider {
     /// Direction, of any length above 0, in the frame of the shape, of a collider that collides on one side only, as a
     /// [one-sided body](crate::RigidBody::with_one_way) does; `None` for all others.
     pub one_way: Option<Vec3>,
+    /// Whether it is a sensor, as a [body](crate::RigidBody::with_sensor) may be: it has no contacts, and the world reports the
+    /// parts of other objects that overlap it.
+    pub sensor: bool,
 }
 
 impl Collider {
@@ -43,6 +46,7 @@ impl Collider {
             name: None,
             shape_materials: ShapeMaterials::default(),
             one_way: None,
+            sensor: false,
         }
     }
 
@@ -64,6 +68,28 @@ impl Collider {
     #[must_use]
     pub fn with_shape_material(mut self, shape: usize, material: Material) -> Self {
         self.shape_materials.set(shape, Some(material));
+        self
+    }
+
+    /// Sets its collision group and the groups that it collides with, one bit each.
+    #[must_use]
+    pub fn with_groups(mut self, group: CollisionGroup, mask: u64) -> Self {
+        (self.group, self.mask) = (group, mask);
+        self
+    }
+
+    /// Sets how its mesh or cylinder collides.
+    #[must_use]
+    pub fn with_contact_mode(mut self, mode: ContactMode) -> Self {
+        self.contact_mode = mode;
+        self
+    }
+
+    /// Makes it a sensor: it has no contacts, and the world reports the bodies that overlap it
+    /// ([`World::events`](crate::World::events), [`World::touching`](crate::World::touching)).
+    #[must_use]
+    pub fn with_sensor(mut self, sensor: bool) -> Self {
+        self.sensor = sensor;
         self
     }
 

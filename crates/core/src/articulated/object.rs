@@ -32,10 +32,9 @@ impl Object for ArticulatedBody {
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
-        let BodyCache { dynamics, free_motion, zeros, accelerations, .. } = cache.get();
+        let BodyCache { dynamics, zeros, accelerations, .. } = cache.get();
         // they may have changed, and a cache may be that of a fork with others
-        dynamics.set_armatures(&self.model);
-        free_motion.set_armatures(&self.model);
+        dynamics.set_inertias(&self.model);
         let (q, v) = x.split_at(self.model.positions());
         dynamics.refresh(q, v);
         let links = self.model.links().len();
@@ -307,6 +306,10 @@ impl Collidable for ArticulatedBody {
 
     fn one_way(&self, part: usize) -> Option<Vec3> {
         self.collider(part)?.collider.one_way?.try_normalize(0.0)
+    }
+
+    fn is_sensor(&self, part: usize) -> bool {
+        self.collider(part).is_some_and(|p| p.collider.sensor)
     }
 
     fn collision_group(&self, part: usize) -> CollisionGroup {

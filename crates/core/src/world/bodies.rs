@@ -1,7 +1,7 @@
 //! Access to the objects of a world between steps.
 
 use super::{World, WorldError};
-use crate::ArticulatedBody;
+use crate::articulated::{ArticulatedBody, ArticulatedError, LinkMass};
 use crate::object::part_state::{PartPoint, PartState};
 use crate::object::{Integratable, Intersect, Object};
 use crate::rigid::{RigidBody, orientation, vec3};
@@ -206,13 +206,32 @@ impl World {
     /// [`WorldError`]: the object was removed or is not an articulated body, the link does not exist or does not move, its
     /// joint has no armature, or the value is out of its range. Nothing is changed then.
     pub fn set_armature(&mut self, id: ObjectId, link: &str, armature: f64) -> Result<(), WorldError> {
+        self.change_articulated(id, |body| body.with_armature(link, armature))
+    }
+
+    /// Sets mass, center of mass and inertia of a link of an articulated body, in the frame of the link. Those of links that are
+    /// fixed to it stay; together they are the mass of the moving link that carries them. Positions and velocities stay. A
+    /// link that is fixed to the base has no effect on motion.
+    ///
+    /// # Errors
+    /// [`WorldError`]: the object was removed or is not an articulated body, the link does not exist, a number is out of its
+    /// range, or a joint then moves no inertia. Nothing is changed then.
+    pub fn set_link_mass(&mut self, id: ObjectId, link: &str, mass: LinkMass) -> Result<(), WorldError> {
+        self.change_articulated(id, |body| body.with_link_mass(link, mass))
+    }
+
+    /// Changes an articulated body; its state stays.
+    fn change_articulated(
+        &mut self,
+        id: ObjectId,
+        change: impl FnOnce(ArticulatedBody) -> Result<ArticulatedBody, ArticulatedError>,
+    ) -> Result<(), WorldError> {
         self.core.wake(id);
         let core = &mut self.core;
         let entry = core.table.get(id).ok_or(WorldError::Stale)?;
         let any: &dyn std::any::Any = entry.object.as_ref();
         let old = any.downcast_ref::<ArticulatedBody>();
-        let old = old.ok_or_else(|| WorldError::NotArticulated(entry.name.to_string()))?;
-        let new = old.clone().with_armature(link, armature)?;
+        let new = change(old.ok_or_else(|| WorldError::NotArticulated(entry.name.to_string()))?.clone())?;
         let place = core.table.place(id).ok_or(WorldError::Stale)?;
         core.table.placed[place].object = Box::new(new);
         core.integration().refresh_one(id);

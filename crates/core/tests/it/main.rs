@@ -43,6 +43,8 @@ mod impacts;
 mod internal_edges;
 mod limits;
 mod linearize;
+mod link_mass;
+mod link_sensors;
 mod link_surfaces;
 mod loop_joints;
 mod loop_joints_articulated;

@@ -48,6 +48,7 @@ __all__ = [
     "Joint",
     "JointDof",
     "LinearizedStep",
+    "Link",
     "Mesh",
     "Mimic",
     "OpenMesh",
@@ -337,7 +338,9 @@ class RigidBody:
     def mode(self, value: Mode) -> None: ...
     @property
     def enabled(self) -> bool:
-        """Whether it takes part in the simulation. A disabled body keeps its state."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -545,7 +548,9 @@ class Mimic:
         """The joint that it follows: a ``Joint``, or (articulation, link); None if it was removed."""
     @property
     def enabled(self) -> bool:
-        """Whether it acts."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -574,6 +579,13 @@ class Sensor:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -617,6 +629,13 @@ class SpringMesh:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -676,6 +695,13 @@ class ParticleSystem:
     def name(self) -> str:
         """Name, unique in its world."""
     @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
     def exists(self) -> bool:
         """Whether its world still has it."""
     @property
@@ -713,6 +739,13 @@ class Flock:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -762,6 +795,13 @@ class BodyFlock:
         """
     def remove(self, body: _Body) -> None:
         """Removes a body, given as a handle or by name, from the flock. It stays in the world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -887,7 +927,9 @@ class ScriptedEvent:
         """Whether its world still has it."""
     @property
     def enabled(self) -> bool:
-        """Whether it can fire, and has effects."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -902,6 +944,13 @@ class Template:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -951,6 +1000,13 @@ class Boid:
     @property
     def name(self) -> str:
         """Name, unique in its world."""
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
     @property
     def exists(self) -> bool:
         """Whether its world still has it."""
@@ -1045,7 +1101,9 @@ class Joint:
         """The body on its second side; None for the world."""
     @property
     def enabled(self) -> bool:
-        """Whether it acts. A joint that broke is not enabled; setting True mends it."""
+        """Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+        fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+        """
     @enabled.setter
     def enabled(self, value: bool) -> None: ...
     @property
@@ -1297,9 +1355,12 @@ class ArticulationBuilder:
         qd: float | None = None,
         friction: float = 0.5,
         restitution: float = 0.0,
-        collides: bool = True,
+        collidable: bool = True,
         color: ArrayLike | None = None,
         cone: float | None = None,
+        contacts: Contacts = "surface",
+        group: int = 0,
+        mask: int | Sequence[int] | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1320,7 +1381,7 @@ class ArticulationBuilder:
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
         ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-        start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+        start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
         between its axis, x, y or z, on the link and on the parent, rad.
         """
     def add_shape(
@@ -1330,12 +1391,26 @@ class ArticulationBuilder:
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
         *,
-        collides: bool = True,
+        collidable: bool = True,
         one_way: ArrayLike | None = None,
+        sensor: bool = False,
+        mass: float | None = None,
+        density: float | None = None,
+        friction: float | None = None,
+        restitution: float | None = None,
+        contacts: Contacts | None = None,
+        group: int | None = None,
+        mask: int | Sequence[int] | None = None,
+        color: ArrayLike | None = None,
+        visible: bool = True,
     ) -> None:
-        """Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+        """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
-        shape that collides on one side only, as in ``World.add_rigid``.
+        shape that collides on one side only, as in ``World.add_rigid``. sensor: no contacts; ``events`` reports the bodies that
+        overlap it.
+
+        mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
+        by default those of the link. visible: whether it is drawn.
         """
     def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
         """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
@@ -1346,6 +1421,58 @@ class ArticulationBuilder:
         change it.
         """
     def __repr__(self) -> str: ...
+
+@final
+class Link:
+    """A link of an articulation: its mass, and what its shapes collide with.
+
+    ``Articulation.link`` returns it, also for a fixed link. A handle without data of its own. It can be changed if the
+    articulation is in a world.
+    """
+    @property
+    def articulation(self) -> Articulation:
+        """The articulation."""
+    @property
+    def name(self) -> str:
+        """Name of the link."""
+    @property
+    def mass(self) -> float:
+        """Mass, kg, at least 0: of the link alone, without links that are fixed to it. Setting it keeps positions and
+        velocities and changes the inertia by the same factor; that of a link that had none stays 0. The mass of a link that
+        is fixed to the base has no effect on motion.
+        """
+    @mass.setter
+    def mass(self, value: float) -> None: ...
+    @property
+    def inertia(self) -> _Floats:
+        """Inertia about its center of mass, axes of the link, shape (3, 3), kg·m². Setting it, also by three moments, keeps the
+        velocities.
+        """
+    @inertia.setter
+    def inertia(self, value: ArrayLike) -> None: ...
+    @property
+    def center_of_mass(self) -> _Floats:
+        """The center of mass in the frame of the link, shape (3,), meters. Setting it keeps the motion of the link; the inertia is
+        then about the new center.
+        """
+    @center_of_mass.setter
+    def center_of_mass(self, value: ArrayLike) -> None: ...
+    @property
+    def group(self) -> int | None:
+        """Collision group of its shapes, 0 to 63; None if it has none or they differ. Shapes of links that are fixed to each
+        other have it together.
+        """
+    @group.setter
+    def group(self, value: int) -> None: ...
+    @property
+    def mask(self) -> int | None:
+        """Groups that its shapes collide with, one bit each; None if it has none or they differ. May be set to a sequence of
+        groups, or None for all.
+        """
+    @mask.setter
+    def mask(self, value: int | Sequence[int] | None) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
 
 @final
 class Articulation:
@@ -1432,6 +1559,52 @@ class Articulation:
     @property
     def mass(self) -> float:
         """Mass of all links that can move, kg."""
+    @property
+    def mode(self) -> Mode:
+        """``"dynamic"``, ``"kinematic"`` (its joints move at their velocities, whatever it collides with) or ``"static"``, of a
+        body in a world.
+        """
+    @mode.setter
+    def mode(self, value: Mode) -> None: ...
+    @property
+    def enabled(self) -> bool:
+        """Whether it takes part in the simulation of its world. A disabled body keeps its state."""
+    @enabled.setter
+    def enabled(self, value: bool) -> None: ...
+    @property
+    def asleep(self) -> bool:
+        """Whether it sleeps in its world: the steps leave it out until something touches it (``World(sleep_after=…)``). Any
+        change wakes it.
+        """
+    @property
+    def collidable(self) -> bool:
+        """Whether it collides in its world."""
+    @collidable.setter
+    def collidable(self, value: bool) -> None: ...
+    @property
+    def group(self) -> int | None:
+        """Collision group of its shapes, 0 to 63; None if it has no shape or they differ. Two bodies collide if the group of
+        each is in the mask of the other. Settable for a body in a world; ``Link.group`` is that of one link.
+        """
+    @group.setter
+    def group(self, value: int) -> None: ...
+    @property
+    def mask(self) -> int | None:
+        """Groups that its shapes collide with, one bit each; None if it has no shape or they differ. May be set, for a body in a
+        world, to a sequence of groups, or None for all.
+        """
+    @mask.setter
+    def mask(self, value: int | Sequence[int] | None) -> None: ...
+    @property
+    def touching(self) -> list[RigidBody | Articulation]:
+        """The bodies in contact with it after the last step, or in a sensor of it: a list of handles in the order of
+        ``world.bodies``.
+        """
+    @property
+    def links(self) -> list[Link]:
+        """All links, including fixed ones, in the order of ``link_names``."""
+    def link(self, name: str) -> Link:
+        """Returns a link by name, which may be a fixed one."""
     @property
     def q(self) -> _Floats:
         """Positions, shape (nq,), rad and m."""
@@ -2196,6 +2369,10 @@ class World:
     as many as cores; no number changes the result. budget: largest work of a step in block
     relaxations, None for no bound. event_impulse: N·s, see ``events``. max_turn: largest angle, rad, by
     which forces of joints may turn a part back and forth in a sub-step; frames are divided so that they do not.
+    drift_tolerance: meters, None: 1e-4, or contact_tolerance if that is larger. recovery_speed: at which overlap is
+    corrected, m/s. projection_sweeps: largest number of sweeps of that correction. stabilize_positions: whether
+    positions of joints are corrected. solver_tolerance: a sweep that changes no velocity by more than this ends a
+    solve, m/s. max_relaxations: largest number of block relaxations of a step in sweeps beyond the first 25.
     Names and defaults are those of scene files.
 
     One thread at a time: while one thread steps a world, calls on it from another raise
@@ -2221,6 +2398,12 @@ class World:
         budget: int | None = None,
         event_impulse: float = 0.0,
         max_turn: float = 1.0,
+        drift_tolerance: float | None = None,
+        recovery_speed: float = 3.0,
+        projection_sweeps: int = 15,
+        stabilize_positions: bool = True,
+        solver_tolerance: float = 1e-9,
+        max_relaxations: int = 20000,
     ) -> World: ...
     @staticmethod
     def load(
@@ -2416,6 +2599,68 @@ class World:
         """
     @max_turn.setter
     def max_turn(self, value: float) -> None: ...
+    @property
+    def substeps(self) -> int:
+        """Sub-steps of each step."""
+    @substeps.setter
+    def substeps(self, value: int) -> None: ...
+    @property
+    def iterations(self) -> int:
+        """Largest number of solver sweeps."""
+    @iterations.setter
+    def iterations(self, value: int) -> None: ...
+    @property
+    def max_relaxations(self) -> int:
+        """Largest number of block relaxations of a step in sweeps beyond the first 25."""
+    @max_relaxations.setter
+    def max_relaxations(self, value: int) -> None: ...
+    @property
+    def solver_tolerance(self) -> float:
+        """A sweep that changes no velocity by more than this ends a solve, m/s."""
+    @solver_tolerance.setter
+    def solver_tolerance(self, value: float) -> None: ...
+    @property
+    def projection_sweeps(self) -> int:
+        """Largest number of sweeps of the correction of overlap."""
+    @projection_sweeps.setter
+    def projection_sweeps(self, value: int) -> None: ...
+    @property
+    def stabilize_positions(self) -> bool:
+        """Whether positions of joints are corrected, and not their velocities alone."""
+    @stabilize_positions.setter
+    def stabilize_positions(self, value: bool) -> None: ...
+    @property
+    def contact_tolerance(self) -> float:
+        """Surfaces closer than this are in contact in ``"backtracking"``, m."""
+    @contact_tolerance.setter
+    def contact_tolerance(self, value: float) -> None: ...
+    @property
+    def drift_tolerance(self) -> float:
+        """Depth that a lasting contact may reach within a sub-step, m, at least ``contact_tolerance``."""
+    @drift_tolerance.setter
+    def drift_tolerance(self, value: float) -> None: ...
+    @property
+    def recovery_speed(self) -> float:
+        """Largest speed at which overlap and open joints are corrected, m/s."""
+    @recovery_speed.setter
+    def recovery_speed(self, value: float) -> None: ...
+    @property
+    def integrator_tolerance(self) -> float:
+        """Error of an inner step of ``"dormand_prince"``, m, rad, m/s and rad/s."""
+    @integrator_tolerance.setter
+    def integrator_tolerance(self, value: float) -> None: ...
+    @property
+    def sleep_after(self) -> float | None:
+        """Seconds after which islands that moved by less than ``sleep_within`` sleep until something touches them; None:
+        never.
+        """
+    @sleep_after.setter
+    def sleep_after(self, value: float | None) -> None: ...
+    @property
+    def sleep_within(self) -> float:
+        """Largest displacement of any point of an island at rest during ``sleep_after``, m. Settable while that is not None."""
+    @sleep_within.setter
+    def sleep_within(self, value: float) -> None: ...
     def shape_name(self, body: int | _Body, part: int, shape: int) -> str | None:
         """Returns the name of a shape, or None if it has none, by the numbers that ``contacts`` and queries report.
 
@@ -2879,7 +3124,7 @@ class World:
         linear_drag: float = 0.0,
         quadratic_drag: float = 0.0,
         wind: ArrayLike | None = None,
-        collides: bool = True,
+        collidable: bool = True,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
         two_way: bool = False,
@@ -2896,7 +3141,7 @@ class World:
         emitters: its sources, a list of ``Emitter``. capacity: most particles that live at once. seed: of its random
         numbers. mass, kg, and radius, m, of a particle. friction, restitution: at bodies. gravity_scale: factor of
         gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
-        shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
+        shape (3,), m/s. collidable: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
         momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
         fade: seconds before its end in which a particle shrinks. opacity: share of the light from behind that the middle
         of a particle blocks, 0 to 1, or two numbers, at birth and at the end; None for solid particles. scale: factor of

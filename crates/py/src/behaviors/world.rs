@@ -103,17 +103,17 @@ impl World {
     /// emitters: its sources, a list of ``Emitter``. capacity: most particles that live at once. seed: of its random
     /// numbers. mass, kg, and radius, m, of a particle. friction, restitution: at bodies. gravity_scale: factor of
     /// gravity, negative for smoke. linear_drag: 1/s, quadratic_drag: 1/m, both per mass. wind: velocity of the air,
-    /// shape (3,), m/s. collides: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
+    /// shape (3,), m/s. collidable: with bodies. group, mask: as in ``add_rigid``. two_way: whether bodies get the
     /// momentum that particles lose. color: sRGB, each 0 to 1. drawn_radius: in pictures, m, by default the radius.
     /// fade: seconds before its end in which a particle shrinks. opacity: share of the light from behind that the middle
     /// of a particle blocks, 0 to 1, or two numbers, at birth and at the end; None for solid particles. scale: factor of
     /// the drawn radius, one number or two likewise. end_color: sRGB at the end, where color is that at birth.
     /// glow: colors as they are, without light, for sparks and flames.
     #[pyo3(signature = (name="", emitters=vec![], *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0,
-        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=true, group=0, mask=None, two_way=false, color=None, drawn_radius=None, fade=0.0,
+        linear_drag=0.0, quadratic_drag=0.0, wind=None, collidable=true, group=0, mask=None, two_way=false, color=None, drawn_radius=None, fade=0.0,
         opacity=None, scale=None, end_color=None, glow=false),
         text_signature = "(self, name='', emitters=(), *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0, \
-        linear_drag=0.0, quadratic_drag=0.0, wind=None, collides=True, group=0, mask=None, two_way=False, color=None, drawn_radius=None, fade=0.0, \
+        linear_drag=0.0, quadratic_drag=0.0, wind=None, collidable=True, group=0, mask=None, two_way=False, color=None, drawn_radius=None, fade=0.0, \
         opacity=None, scale=None, end_color=None, glow=False)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_particles<'py>(
@@ -131,7 +131,7 @@ impl World {
         linear_drag: f64,
         quadratic_drag: f64,
         wind: Option<&Bound<'py, PyAny>>,
-        collides: bool,
+        collidable: bool,
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'py, PyAny>>,
         two_way: bool,
@@ -151,7 +151,7 @@ impl World {
             gravity_scale,
             linear_drag,
             quadratic_drag,
-            collides,
+            collidable,
             two_way,
             ..ParticleSettings::default()
         };

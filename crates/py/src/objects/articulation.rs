@@ -216,8 +216,8 @@ impl Articulation {
 
     /// Mass of all links that can move, kg.
     #[getter]
-    fn mass(&self) -> f64 {
-        self.robot.model.mass()
+    fn mass(&self) -> Result<f64> {
+        Ok(self.present()?.model.mass())
     }
 
     /// Positions, shape (nq,), rad and m.
@@ -397,7 +397,8 @@ impl Articulation {
     #[pyo3(signature = (q=None))]
     fn center_of_mass<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
-        let out = py.detach(|| self.robot.center_of_mass(&mut rows))?;
+        let robot = self.present()?;
+        let out = py.detach(|| robot.center_of_mass(&mut rows))?;
         result(py, &rows, out, &[3])
     }
 

@@ -207,17 +207,6 @@ impl RigidBody {
         self.place.write(py, |inner| Ok(inner.world.set_mode(self.place.id, mode)?))
     }
 
-    /// Whether it takes part in the simulation. A disabled body keeps its state.
-    #[getter]
-    fn enabled(&self) -> Result<bool> {
-        Ok(self.place.status()?.enabled)
-    }
-
-    #[setter]
-    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
-    }
-
     /// Whether it sleeps: the steps leave it out until something touches it
     /// (``World(sleep_after=…)``). Any change wakes it.
     #[getter]

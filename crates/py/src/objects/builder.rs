@@ -1,6 +1,6 @@
 //! Makes descriptions of articulated bodies link by link.
 
-use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or};
+use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or, whole_number};
 use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
 use crate::objects::appearance::palette;
@@ -8,10 +8,11 @@ use crate::objects::articulation::Articulation;
 use crate::objects::body::inertia;
 use crate::objects::joints::drive_of;
 use crate::objects::shapes::Shape;
+use crate::world::query;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard};
-use tumble::collide::{Mat3, Vec3};
+use tumble::collide::{ContactMode, Mat3, Vec3};
 use tumble::dynamics::{Appearance, ArticulationBuilder as Builder, Joint, LinkBuilder, LinkMass, Material};
 
 /// Makes an articulated body link by link, without a file.
@@ -80,15 +81,16 @@ impl ArticulationBuilder {
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-    /// start. friction, restitution, collides: of the shapes. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+    /// start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
     /// between its axis, x, y or z, on the link and on the parent, rad.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=true, color=None, cone=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
-        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collides=True, color=None, cone=None)"
+        joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=True, color=None, cone=None, \
+        contacts='surface', group=0, mask=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -119,9 +121,12 @@ impl ArticulationBuilder {
         qd: Option<f64>,
         friction: f64,
         restitution: f64,
-        collides: bool,
+        collidable: bool,
         color: Option<&Bound<'_, PyAny>>,
         cone: Option<f64>,
+        contacts: &str,
+        #[pyo3(from_py_with = whole_number)] group: u8,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
@@ -139,7 +144,9 @@ impl ArticulationBuilder {
             .with_joint_damping(joint_damping)
             .with_joint_friction(joint_friction)
             .with_armature(armature)
-            .with_material(Material { restitution, friction, ..Material::default() });
+            .with_material(Material { restitution, friction, ..Material::default() })
+            .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
+            .with_groups(query::group(group)?, query::mask(mask)?);
         if let Some(parent) = parent {
             self.has(parent)?;
             link = link.with_parent(parent);
@@ -171,16 +178,21 @@ impl ArticulationBuilder {
         link = link.with_appearance(Appearance { color, ..Appearance::default() });
         link = with_mass(link, (mass, density), center_of_mass, inertia)?;
         if let Some(shape) = shape {
-            link = with_shape(link, &shape, shape_position, shape_orientation, collides)?;
+            link = with_shape(link, &shape, shape_position, shape_orientation, collidable)?;
         }
         self.change(|builder| builder.link(link));
         Ok(())
     }
 
-    /// Adds a shape to a link. position, orientation: in the frame of the link. collides: whether it
+    /// Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
     /// collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
-    /// shape that collides on one side only, as in ``World.add_rigid``.
-    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collides=true, one_way=None))]
+    /// shape that collides on one side only, as in ``World.add_rigid``. sensor: no contacts; ``events`` reports the bodies that
+    /// overlap it.
+    ///
+    /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
+    /// by default those of the link. visible: whether it is drawn.
+    #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None, sensor=false, mass=None, density=None,
+        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -188,16 +200,48 @@ impl ArticulationBuilder {
         shape: PyRef<'_, Shape>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
-        collides: bool,
+        collidable: bool,
         one_way: Option<&Bound<'_, PyAny>>,
+        sensor: bool,
+        mass: Option<f64>,
+        density: Option<f64>,
+        friction: Option<f64>,
+        restitution: Option<f64>,
+        contacts: Option<&str>,
+        group: Option<u8>,
+        mask: Option<&Bound<'_, PyAny>>,
+        color: Option<&Bound<'_, PyAny>>,
+        visible: bool,
     ) -> Result<()> {
         self.has(link)?;
-        let direction = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
-        let mut builder = self.builder();
-        if let Some(known) = builder.link_mut(link) {
-            let with = with_shape(known.clone(), &shape, position, orientation, collides)?;
-            *known = direction.into_iter().fold(with, LinkBuilder::with_one_way);
+        if mass.is_some() && density.is_some() {
+            return Err(Error::value(format!("shape of link '{link}': expected a mass or a density, not both")));
         }
+        let one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
+        let mode = contacts.map(|contacts| meaning("contacts", contacts, ContactMode::NAMES)).transpose()?;
+        let (group, mask) =
+            (group.map(query::group).transpose()?, mask.map(|mask| query::mask(Some(mask))).transpose()?);
+        let color = color.map(|color| vec3(color, "color")).transpose()?;
+        let pose = pose(position, orientation)? * shape.placement;
+        let mut builder = self.builder();
+        let Some(known) = builder.link_mut(link) else { return Ok(()) };
+        let mut collider = known.collider(shape.solid.clone(), pose).with_sensor(sensor);
+        collider.contact_mode = mode.unwrap_or(collider.contact_mode);
+        (collider.group, collider.mask) = (group.unwrap_or(collider.group), mask.unwrap_or(collider.mask));
+        collider.material.friction = friction.unwrap_or(collider.material.friction);
+        collider.material.restitution = restitution.unwrap_or(collider.material.restitution);
+        (collider.one_way, collider.name) = (one_way, shape.name.clone());
+        let with = match collidable {
+            true => known.clone().with_collider(collider),
+            false => shape
+                .name
+                .iter()
+                .fold(known.clone().with_visual_shape(shape.solid.clone(), pose), LinkBuilder::with_shape_name),
+        };
+        let with = mass.into_iter().fold(with.with_shape_visible(visible), LinkBuilder::with_shape_mass);
+        let with = density.into_iter().fold(with, LinkBuilder::with_shape_density);
+        let looks = color.map(|color| Appearance { color: color.map(|c| c as f32).into(), ..Appearance::default() });
+        *known = looks.into_iter().fold(with, LinkBuilder::with_shape_appearance);
         Ok(())
     }
 
@@ -236,10 +280,10 @@ fn with_shape(
     shape: &Shape,
     position: Option<&Bound<'_, PyAny>>,
     orientation: Option<&Bound<'_, PyAny>>,
-    collides: bool,
+    collidable: bool,
 ) -> Result<LinkBuilder> {
     let (solid, pose) = (shape.solid.clone(), pose(position, orientation)? * shape.placement);
-    let link = if collides { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) };
+    let link = if collidable { link.with_shape(solid, pose) } else { link.with_visual_shape(solid, pose) };
     Ok(shape.name.iter().fold(link, LinkBuilder::with_shape_name))
 }
 

@@ -1,4 +1,4 @@
-//! The common part of the handles of objects: name, existence, equality, hash, text, and garbage collection.
+//! The common part of the handles of objects: name, existence, switch, equality, hash, text, and garbage collection.
 
 /// Gives a class with the fields `place: Place` and `anchor: Py<Anchor>` what handles have, and a constructor. `$shown` returns what its text
 /// says behind the name, `None` if the object was removed.
@@ -24,6 +24,18 @@ macro_rules! handle {
             #[getter]
             fn exists(&self) -> crate::errors::Result<bool> {
                 self.place.exists()
+            }
+
+            /// Whether it takes part in the simulation. A disabled object keeps its state and has no effect: an event does not
+            /// fire, a sensor is not read. A joint that broke is disabled; setting True mends it.
+            #[getter]
+            fn enabled(&self) -> crate::errors::Result<bool> {
+                Ok(self.place.status()?.enabled)
+            }
+
+            #[setter]
+            fn set_enabled(&self, py: pyo3::Python<'_>, value: bool) -> crate::errors::Result<()> {
+                self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
             }
 
             fn __repr__(&self) -> String {

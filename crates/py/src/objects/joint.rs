@@ -113,17 +113,6 @@ impl Joint {
         self.side(py, 1)
     }
 
-    /// Whether it acts. A joint that broke is not enabled; setting True mends it.
-    #[getter]
-    fn enabled(&self) -> Result<bool> {
-        Ok(self.place.status()?.enabled)
-    }
-
-    #[setter]
-    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
-    }
-
     /// Its degrees of freedom: (angle) of ``"revolute"``, (displacement) of ``"prismatic"`` and ``"screw"``, (displacement,
     /// angle) of ``"cylindrical"``, angles about the axis and the second axis of ``"universal"``, displacements along
     /// x and y of b's frame and the angle of ``"planar"``, the rotation vector in b's frame of ``"spherical"``, (length) of kinds with a length.

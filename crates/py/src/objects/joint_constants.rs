@@ -8,17 +8,15 @@ use crate::objects::robot::Robot;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::sync::Arc;
-use tumble::dynamics::articulated::Model;
 use tumble::dynamics::{ArticulatedBody, DofSettings, Joint, Spring};
 
 impl Articulation {
-    /// Returns the robot with the armatures that a body in a world has now.
+    /// Returns the robot with the masses and armatures that a body in a world has now.
     pub(super) fn present(&self) -> Result<Arc<Robot>> {
         let Binding::Placed(place) = &self.spot else { return Ok(self.robot.clone()) };
-        let armatures = |model: &Model| -> Vec<f64> { model.links().iter().map(|link| link.armature).collect() };
         let changed = place.read(|inner| {
             let model = inner.world.get::<ArticulatedBody>(place.id)?.model();
-            Some((armatures(model) != armatures(&self.robot.model)).then(|| model.clone()))
+            Some((*model != self.robot.model).then(|| model.clone()))
         })?;
         Ok(match changed {
             Some(model) => Arc::new(Robot { model, ..Robot::clone(&self.robot) }),

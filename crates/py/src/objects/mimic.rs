@@ -56,17 +56,6 @@ impl Mimic {
         self.side(py, 1)
     }
 
-    /// Whether it acts.
-    #[getter]
-    fn enabled(&self) -> Result<bool> {
-        Ok(self.place.status()?.enabled)
-    }
-
-    #[setter]
-    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
-    }
-
     /// Ratio of the positions, not 0.
     #[getter]
     fn multiplier(&self) -> Result<f64> {

@@ -2,6 +2,7 @@
 
 pub mod appearance;
 pub mod articulation;
+pub mod articulation_status;
 pub mod binding;
 pub mod bodies;
 pub mod body;
@@ -13,6 +14,7 @@ pub mod joint;
 pub mod joint_constants;
 pub mod joint_dof;
 pub mod joints;
+pub mod link;
 pub mod mimic;
 pub mod place;
 pub mod robot;

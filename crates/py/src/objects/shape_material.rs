@@ -84,43 +84,79 @@ impl RigidBody {
         let shape = self.numbered(shape)?;
         as_dict(py, &self.constant(|body| body.shape_material(shape))?)
     }
+}
 
+/// Gives a class the method `set_shape_material`, whose first arguments say which shape; `$set` sets the constants that are given.
+macro_rules! set_shape_material {
+    ($class:ident, ($($place:ident: $kind:ty),+), $set:expr, $(#[$doc:meta])+) => {
+        #[pymethods]
+        impl $class {
+            $(#[$doc])+
+            #[pyo3(signature = ($($place),+, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None,
+                rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
+            #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+            fn set_shape_material(
+                &self,
+                py: Python<'_>,
+                $($place: $kind),+,
+                friction: Option<f64>,
+                restitution: Option<f64>,
+                static_friction: Option<f64>,
+                stribeck_speed: Option<f64>,
+                friction_scale: Option<&Bound<'_, PyAny>>,
+                rolling_friction: Option<f64>,
+                torsional_friction: Option<f64>,
+                tangential_restitution: Option<f64>,
+                adhesion: Option<f64>,
+                surface_velocity: Option<&Bound<'_, PyAny>>,
+            ) -> Result<()> {
+                let numbers = [
+                    friction,
+                    restitution,
+                    static_friction,
+                    stribeck_speed,
+                    rolling_friction,
+                    torsional_friction,
+                    tangential_restitution,
+                    adhesion,
+                ];
+                let given = Given::new(numbers, friction_scale, surface_velocity)?;
+                let set: fn(&$class, Python<'_>, Given, $($kind),+) -> Result<()> = $set;
+                set(self, py, given, $($place),+)
+            }
+        }
+    };
+}
+
+set_shape_material!(
+    RigidBody,
+    (shape: Which),
+    |body, py, given, shape| {
+        let shape = body.numbered(shape)?;
+        body.change(py, |body| body.set_shape_material(shape, given.over(body.shape_material(shape))))
+    },
     /// Sets surface constants of one shape, the part of a ``Compound``, by the names of the properties of the body.
     ///
     /// shape: name or index of the part. Constants that are not given stay as they are, for a shape without its own those of
     /// the body at this time. Without any, the shape has those of the body again.
-    #[pyo3(signature = (shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None,
-        torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn set_shape_material(
-        &self,
-        py: Python<'_>,
-        shape: Which,
-        friction: Option<f64>,
-        restitution: Option<f64>,
-        static_friction: Option<f64>,
-        stribeck_speed: Option<f64>,
-        friction_scale: Option<&Bound<'_, PyAny>>,
-        rolling_friction: Option<f64>,
-        torsional_friction: Option<f64>,
-        tangential_restitution: Option<f64>,
-        adhesion: Option<f64>,
-        surface_velocity: Option<&Bound<'_, PyAny>>,
-    ) -> Result<()> {
-        let numbers = [
-            friction,
-            restitution,
-            static_friction,
-            stribeck_speed,
-            rolling_friction,
-            torsional_friction,
-            tangential_restitution,
-            adhesion,
-        ];
-        let (given, shape) = (Given::new(numbers, friction_scale, surface_velocity)?, self.numbered(shape)?);
-        self.change(py, |body| body.set_shape_material(shape, given.over(body.shape_material(shape))))
-    }
-}
+);
+
+set_shape_material!(
+    Articulation,
+    (link: &str, shape: Which),
+    |articulation, py, given, link, shape| {
+        let (place, (part, shape)) = (articulation.in_world()?, articulation.of_link(link, shape)?);
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let material = body.shape_material(part, shape).and_then(|own| given.over(own));
+            Ok(body.set_shape_material(part, shape, material)?)
+        })
+    },
+    /// Sets surface constants of one shape of a link of a body in a world, by the names of ``RigidBody.set_shape_material``.
+    ///
+    /// shape: name, or number as ``shapes`` of contacts has it. Constants that are not given stay as they are. Without any,
+    /// a part of a ``Compound`` has those of the compound again.
+);
 
 impl RigidBody {
     fn numbered(&self, shape: Which) -> Result<usize> {
@@ -140,49 +176,6 @@ impl Articulation {
         let (part, shape) = self.of_link(link, shape)?;
         let found = self.of_body(|body| body.shape_material(part, shape))?;
         as_dict(py, &found.unwrap_or_default())
-    }
-
-    /// Sets surface constants of one shape of a link of a body in a world, by the names of ``RigidBody.set_shape_material``.
-    ///
-    /// shape: name, or number as ``shapes`` of contacts has it. Constants that are not given stay as they are. Without any,
-    /// a part of a ``Compound`` has those of the compound again.
-    #[pyo3(signature = (link, shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None,
-        rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn set_shape_material(
-        &self,
-        py: Python<'_>,
-        link: &str,
-        shape: Which,
-        friction: Option<f64>,
-        restitution: Option<f64>,
-        static_friction: Option<f64>,
-        stribeck_speed: Option<f64>,
-        friction_scale: Option<&Bound<'_, PyAny>>,
-        rolling_friction: Option<f64>,
-        torsional_friction: Option<f64>,
-        tangential_restitution: Option<f64>,
-        adhesion: Option<f64>,
-        surface_velocity: Option<&Bound<'_, PyAny>>,
-    ) -> Result<()> {
-        let numbers = [
-            friction,
-            restitution,
-            static_friction,
-            stribeck_speed,
-            rolling_friction,
-            torsional_friction,
-            tangential_restitution,
-            adhesion,
-        ];
-        let place = self.in_world()?;
-        let (given, (part, shape)) =
-            (Given::new(numbers, friction_scale, surface_velocity)?, self.of_link(link, shape)?);
-        place.write(py, |inner| {
-            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let material = body.shape_material(part, shape).and_then(|own| given.over(own));
-            Ok(body.set_shape_material(part, shape, material)?)
-        })
     }
 }
 

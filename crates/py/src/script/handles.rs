@@ -24,17 +24,6 @@ impl ScriptedEvent {
     fn fired(&self) -> Result<u64> {
         self.place.read(|inner| Core::fired(&inner.world, self.place.id))
     }
-
-    /// Whether it can fire, and has effects.
-    #[getter]
-    fn enabled(&self) -> Result<bool> {
-        Ok(self.place.status()?.enabled)
-    }
-
-    #[setter]
-    fn set_enabled(&self, py: Python<'_>, value: bool) -> Result<()> {
-        self.place.write(py, |inner| Ok(inner.world.set_enabled(self.place.id, value)?))
-    }
 }
 
 /// Equal bodies that events spawn, made by ``World.add_template`` or ``[[template]]``.

@@ -42,6 +42,10 @@ use tumble::scene::{FileKind, LoadOptions, SceneFile, resolve_scene};
 /// as many as cores; no number changes the result. budget: largest work of a step in block
 /// relaxations, None for no bound. event_impulse: N·s, see ``events``. max_turn: largest angle, rad, by
 /// which forces of joints may turn a part back and forth in a sub-step; frames are divided so that they do not.
+/// drift_tolerance: meters, None: 1e-4, or contact_tolerance if that is larger. recovery_speed: at which overlap is
+/// corrected, m/s. projection_sweeps: largest number of sweeps of that correction. stabilize_positions: whether
+/// positions of joints are corrected. solver_tolerance: a sweep that changes no velocity by more than this ends a
+/// solve, m/s. max_relaxations: largest number of block relaxations of a step in sweeps beyond the first 25.
 /// Names and defaults are those of scene files.
 ///
 /// One thread at a time: while one thread steps a world, calls on it from another raise
@@ -79,10 +83,12 @@ impl World {
     #[pyo3(
         text_signature = "(gravity=(0.0, 0.0, -9.81), dt=0.004166666666666667, stepper='time_stepping', integrator='verlet', \
         solver='gauss_seidel', *, substeps=1, iterations=200, contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, \
-        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0, max_turn=1.0)"
+        combine_restitution='max', combine_friction='geometric_mean', threads=1, budget=None, event_impulse=0.0, max_turn=1.0, \
+        drift_tolerance=None, recovery_speed=3.0, projection_sweeps=15, stabilize_positions=True, solver_tolerance=1e-9, max_relaxations=20000)"
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
-        contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0))]
+        contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0,
+        drift_tolerance=None, recovery_speed=3.0, projection_sweeps=15, stabilize_positions=true, solver_tolerance=1e-9, max_relaxations=20000))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -103,6 +109,12 @@ impl World {
         budget: Option<u32>,
         event_impulse: f64,
         max_turn: f64,
+        drift_tolerance: Option<f64>,
+        recovery_speed: f64,
+        #[pyo3(from_py_with = whole_number)] projection_sweeps: u32,
+        stabilize_positions: bool,
+        solver_tolerance: f64,
+        #[pyo3(from_py_with = whole_number)] max_relaxations: u32,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -113,6 +125,9 @@ impl World {
         (world.contact_tolerance_m, world.integrator_tolerance) = (contact_tolerance, integrator_tolerance);
         (world.sleep_after_s, world.sleep_within_m) = (sleep_after, sleep_within);
         (world.event_impulse_n_s, world.max_turn_rad) = (event_impulse, max_turn);
+        (world.drift_tolerance_m, world.recovery_speed_m_per_s) = (drift_tolerance, recovery_speed);
+        (world.projection_sweeps, world.stabilize_positions) = (projection_sweeps, stabilize_positions);
+        (world.solver_tolerance_m_per_s, world.max_relaxations) = (solver_tolerance, max_relaxations);
         world.combine_restitution = combine(combine_restitution, "combine_restitution")?;
         world.combine_friction = combine(combine_friction, "combine_friction")?;
         World::of(py, build(scene)?)

@@ -117,7 +117,7 @@ fn position(link: &LinkSpec, base: &Pose) -> Vec<f64> {
 
 fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result<(), ArticulatedError> {
     let surface = &placed.spec.surface;
-    if let Some(shape) = placed.solid().filter(|_| placed.spec.collides) {
+    if let Some(shape) = placed.solid().filter(|_| placed.spec.collidable) {
         let material = Material { id: material_id(surface.material), ..surface.contact };
         let mut collider = Collider {
             contact_mode: surface.contacts,
@@ -125,6 +125,7 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
             mask: surface.mask,
             name: placed.spec.name.clone(),
             one_way: placed.spec.one_way.map(Vec3::from),
+            sensor: placed.spec.sensor,
             ..Collider::new(shape.clone(), placed.spec.pose).with_material(material)
         };
         if let Geometry::Shape(spec) = &placed.spec.geometry {
@@ -168,7 +169,7 @@ fn exclude_overlapping(
     let solid: Vec<Solid<'_>> = shapes
         .iter()
         .enumerate()
-        .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collides).map(move |p| (link, p)))
+        .flat_map(|(link, placed)| placed.iter().filter(|p| p.spec.collidable).map(move |p| (link, p)))
         .filter_map(|(link, p)| Some(Solid { link, shape: p.solid()?, pose: poses[link] * p.pose }))
         .collect();
     // Parts are the links, the base, then the colliders in this order.

@@ -56,8 +56,8 @@ impl SceneFile {
             let mount = mount.as_ref().and_then(|part| self.part(world, part));
             system = system.with_emitter(Emitter { mount, ..emitter.clone() })?;
         }
-        world.add(system)?;
-        Ok(())
+        let id = world.add(system)?;
+        Ok(world.set_enabled(id, spec.enabled)?)
     }
 
     fn add_field(&self, spec: &FieldSpec, world: &mut World) -> Result<(), BehaviorError> {
@@ -66,7 +66,7 @@ impl SceneFile {
             Some(names) => Targets::Only(names.iter().filter_map(|name| world.find(name)).collect()),
             None => Targets::All,
         };
-        match &spec.kind {
+        let id = match &spec.kind {
             FieldKind::Wind { velocity_m_per_s, drag_n_s_per_m, density_kg_per_m3, drag_coefficient } => {
                 let law = match *drag_n_s_per_m {
                     Some(coefficient) => DragLaw::Linear { coefficient },
@@ -92,7 +92,7 @@ impl SceneFile {
                 world.add(Panels::new(name, *density_kg_per_m3, Vec3::from(*wind_m_per_s), panels)?)?
             }
         };
-        Ok(())
+        Ok(world.set_enabled(id, spec.enabled)?)
     }
 
     fn panel(&self, spec: &PanelSpec, world: &World) -> Option<Panel> {
@@ -102,7 +102,7 @@ impl SceneFile {
     }
 }
 
-fn add_soft(spec: &SoftSpec, world: &mut World) -> Result<ObjectId, BehaviorError> {
+fn add_soft(spec: &SoftSpec, world: &mut World) -> Result<(), BehaviorError> {
     let mesh = match &spec.grid {
         Grid::Cloth(cloth) => cloth.mesh()?,
         Grid::Jelly(jelly) => jelly.mesh()?,
@@ -118,7 +118,13 @@ fn add_soft(spec: &SoftSpec, world: &mut World) -> Result<ObjectId, BehaviorErro
     if let Some(radius) = spec.node_radius_m {
         mesh = mesh.with_radius(radius)?;
     }
-    SpringMesh::add(world, mesh)
+    let id = SpringMesh::add(world, mesh)?;
+    set_status(world, id, spec.enabled, spec.collidable)
+}
+
+fn set_status(world: &mut World, id: ObjectId, enabled: bool, collidable: bool) -> Result<(), BehaviorError> {
+    world.set_collidable(id, collidable)?;
+    Ok(world.set_enabled(id, enabled)?)
 }
 
 fn add_flock(spec: &FlockSpec, world: &mut World) -> Result<(), BehaviorError> {
@@ -127,17 +133,18 @@ fn add_flock(spec: &FlockSpec, world: &mut World) -> Result<(), BehaviorError> {
         let visuals = Boid::dart(4.0 * group.radius_m, appearance(&group.appearance, &Vec3::zeros()));
         for k in 0..group.count {
             let boid = boid(group)?.with_name(group.name_of(k)).with_position(group.start(k));
-            Flock::add(world, flock, boid.with_visuals(visuals.clone()))?;
+            let id = Flock::add(world, flock, boid.with_visuals(visuals.clone()))?;
+            set_status(world, id, group.enabled, group.collidable)?;
         }
     }
-    Ok(())
+    Ok(world.set_enabled(flock, spec.enabled)?)
 }
 
 fn add_body_flock(spec: &BodyFlockSpec, world: &mut World) -> Result<(), BehaviorError> {
     let mut flock = BodyFlock::new(spec.name.as_str(), spec.steering, spec.helm)?;
     spec.bodies.iter().filter_map(|name| world.find(name)).for_each(|id| flock.push(id));
-    world.add(flock)?;
-    Ok(())
+    let id = world.add(flock)?;
+    Ok(world.set_enabled(id, spec.enabled)?)
 }
 
 fn boid(group: &BoidGroupSpec) -> Result<Boid, BehaviorError> {

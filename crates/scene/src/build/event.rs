@@ -17,7 +17,9 @@ impl EventSpec {
             set_part(world, spec, &mut action);
             event.with_action(action)
         });
-        world.add(event)
+        let id = world.add(event)?;
+        world.set_enabled(id, self.enabled)?;
+        Ok(id)
     }
 }
 

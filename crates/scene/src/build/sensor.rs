@@ -1,6 +1,6 @@
 //! Measuring sensors of a scene.
 
-use tumble_core::collide::Pose;
+use tumble_core::collide::{Pose, Shape};
 use tumble_core::{Anchor, ArticulatedBody, ObjectId, Sensor, SensorPlace, World};
 
 use super::error::BuildError;
@@ -10,7 +10,7 @@ use crate::parse::loop_joint::PartSpec;
 use crate::parse::sensor::{SensorPlaceSpec, SensorSpec};
 
 impl SceneFile {
-    pub(super) fn add_sensor(&self, spec: &SensorSpec, world: &mut World) -> Result<(), BuildError> {
+    pub(super) fn add_sensor(&self, spec: &SensorSpec, meshes: &[Shape], world: &mut World) -> Result<(), BuildError> {
         let wrong = |why: String| BuildError::Sensor { scene: self.file.clone(), why };
         let gone = || wrong(format!("sensor '{}': what it is on is not in the world", spec.name));
         let place = match spec.on {
@@ -34,7 +34,7 @@ impl SceneFile {
                 sensor = sensor.relative_to(anchor).map_err(text)?;
             }
             if let Some(volume) = &spec.volume {
-                sensor = sensor.with_volume(shapes::make(volume, &[]).map_err(|e| e.to_string())?).map_err(text)?;
+                sensor = sensor.with_volume(shapes::make(volume, meshes).map_err(|e| e.to_string())?).map_err(text)?;
             }
             if let Some(optics) = spec.optics {
                 sensor = sensor.with_optics(optics).map_err(text)?;
@@ -42,7 +42,8 @@ impl SceneFile {
             sensor.with_cutoff(spec.cutoff).and_then(|sensor| sensor.with_noise(spec.noise)).map_err(text)
         };
         let sensor = make().map_err(wrong)?;
-        world.add(sensor).map(drop).map_err(|e| wrong(e.to_string()))
+        let id = world.add(sensor).map_err(|e| wrong(e.to_string()))?;
+        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
     }
 
     /// Returns a frame of a body or of a link, which may be a fixed one, in the world.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{CompoundPart, Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
-use tumble_core::{Material, VisualGeometry, VisualMesh};
+use tumble_core::{Material, RigidBody, VisualGeometry, VisualMesh};
 
 use crate::build::appearance::material_id;
 use crate::build::mesh_files::{read_file, stretched};
@@ -154,7 +154,7 @@ impl<'m> ShapeMaker<'m> {
         let mut placed = Vec::with_capacity(link.shapes.len());
         let mut lost_visual = false;
         let unused =
-            |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collides && !spec.visible;
+            |spec: &&LinkShape| matches!(spec.geometry, Geometry::File { .. }) && !spec.collidable && !spec.visible;
         for spec in link.shapes.iter().filter(|spec| !unused(spec)) {
             match self.geometry(spec)? {
                 Some(geometry) => {
@@ -183,7 +183,7 @@ impl<'m> ShapeMaker<'m> {
         let as_shape = |shape| Some(VisualGeometry::Shape(shape));
         match &spec.geometry {
             Geometry::Shape(shape) => make(shape, self.meshes).map(as_shape).map_err(|e| e.to_string()),
-            Geometry::File { path, scale, .. } if !spec.collides => {
+            Geometry::File { path, scale, .. } if !spec.collidable => {
                 let key = (path.clone(), scale.map(f64::to_bits));
                 let mesh = self.visuals.entry(key).or_insert_with(|| Arc::new(visual_mesh::of_file(path, *scale)));
                 Ok(Some(VisualGeometry::Mesh(mesh.clone())))
@@ -251,7 +251,7 @@ pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, S
     match link.mass {
         LinkMassSpec::Given(mass) => Ok(mass),
         LinkMassSpec::OfShapes => total(&|placed| placed.spec.mass),
-        LinkMassSpec::Spread(MassSpec::Density(density)) => total(&|_| Some(MassSpec::Density(density))),
+        LinkMassSpec::Spread(spec @ (MassSpec::Density(_) | MassSpec::Usual)) => total(&|_| Some(spec)),
         LinkMassSpec::Spread(MassSpec::Mass(mass)) => {
             let volume: f64 = placed.iter().filter_map(Placed::solid).map(Shape::volume).sum();
             total(&|_| Some(MassSpec::Density(mass / volume)))
@@ -263,6 +263,7 @@ pub(crate) fn mass(link: &LinkSpec, placed: &[Placed<'_>]) -> Result<LinkMass, S
 fn own_mass(shape: &Shape, mass: MassSpec) -> Result<LinkMass, ShapeError> {
     let properties = match mass {
         MassSpec::Density(density) => shape.mass_properties(density)?,
+        MassSpec::Usual => shape.mass_properties(shape.own_density().unwrap_or(RigidBody::DEFAULT_DENSITY))?,
         MassSpec::Mass(mass) => shape.mass_properties(1.0)?.with_mass(mass),
     };
     Ok(LinkMass { mass: properties.mass, center: properties.center_of_mass, inertia: properties.inertia })

@@ -56,7 +56,7 @@ impl SceneFile {
         for spec in &self.bodies {
             let body = self.body(spec, &meshes)?;
             let id = built.add_boxed(Box::new(body), spec.mode).map_err(|e| self.body_error(spec, e))?;
-            built.set_collidable(id, spec.collides).map_err(world)?;
+            built.set_collidable(id, spec.collidable).map_err(world)?;
             built.set_enabled(id, spec.enabled).map_err(world)?;
         }
         let mut maker = ShapeMaker::new(&meshes, purpose);
@@ -76,16 +76,17 @@ impl SceneFile {
             let added = Template::add(&mut built, &spec.body.name, &body, spec.count, spec.reuse);
             added.map_err(|e| self.body_error(&spec.body, e))?;
         }
-        for spec in &self.events {
-            spec.add(&mut built).map_err(world)?;
-        }
         for spec in &self.sensors {
-            self.add_sensor(spec, &mut built)?;
+            self.add_sensor(spec, &meshes, &mut built)?;
         }
         for spec in &self.pairs {
             self.add_pair(spec, &mut built).map_err(world)?;
         }
         self.add_behaviors(&mut built)?;
+        // they may enable and disable all of the above
+        for spec in &self.events {
+            spec.add(&mut built).map_err(world)?;
+        }
         Ok((built, notes))
     }
 
@@ -98,7 +99,12 @@ impl SceneFile {
         let wrong = |why: String| BuildError::Articulated { scene: self.file.clone(), body: spec.name.clone(), why };
         let body = articulated::body(spec, maker).map_err(wrong)?;
         let id = world.add(body).map_err(|e| wrong(e.to_string()))?;
-        world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
+        let set = |world: &mut World| {
+            world.set_mode(id, spec.mode)?;
+            world.set_collidable(id, spec.collidable)?;
+            world.set_enabled(id, spec.enabled)
+        };
+        set(world).map_err(|e: WorldError| wrong(e.to_string()))
     }
 
     fn add_loop_joint(&self, spec: &LoopJointSpec, world: &mut World) -> Result<(), BuildError> {
@@ -203,9 +209,17 @@ impl SceneFile {
             .with_substeps(w.substeps)
             .with_integrator(w.integrator.into())
             .with_integrator_tolerance(w.integrator_tolerance)
-            .with_solver_settings(SolverSettings { max_sweeps: w.iterations, budget: w.budget, ..base.solver_settings })
+            .with_solver_settings(SolverSettings {
+                max_sweeps: w.iterations,
+                max_relaxations: w.max_relaxations,
+                tolerance: w.solver_tolerance_m_per_s,
+                budget: w.budget,
+            })
+            .with_projection_sweeps(w.projection_sweeps)
+            .with_stabilize_positions(w.stabilize_positions)
+            .with_recovery_speed(w.recovery_speed_m_per_s)
             .with_contact_tolerance(w.contact_tolerance_m)
-            .with_drift_tolerance(base.drift_tolerance.max(w.contact_tolerance_m))
+            .with_drift_tolerance(w.drift_tolerance_m.unwrap_or(base.drift_tolerance.max(w.contact_tolerance_m)))
             .with_sleep(w.sleep_after_s.map(|after| Sleep { after, within: w.sleep_within_m }))
             .with_combine_friction(w.combine_friction)
             .with_combine_restitution(w.combine_restitution)
@@ -220,6 +234,7 @@ impl SceneFile {
         let body = match spec.mass {
             Some(MassSpec::Mass(mass)) => body.with_mass(mass),
             Some(MassSpec::Density(density)) => body.with_density(density),
+            Some(MassSpec::Usual) => body.with_density(shape.own_density().unwrap_or(RigidBody::DEFAULT_DENSITY)),
             None => shape.own_density().into_iter().fold(body, RigidBody::with_density),
         };
         let body = spec.inertia_kg_m2.into_iter().fold(body, RigidBody::with_inertia);

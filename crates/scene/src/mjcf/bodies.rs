@@ -50,8 +50,8 @@ impl Assembly<'_, '_> {
     fn add_static(&mut self, body: usize) {
         let (bodies, pose) = (self.bodies, self.poses[body]);
         for (k, geom) in bodies[body].geoms.iter().enumerate() {
-            let collides = self.groups.collides(geom);
-            if !collides && !geom.visible {
+            let collidable = self.groups.collides(geom);
+            if !collidable && !geom.visible {
                 continue;
             }
             let Some(made) = make(geom, self.reader) else { continue };
@@ -60,7 +60,7 @@ impl Assembly<'_, '_> {
             let (name, shape) = (self.taken.unique(name), self.meshes.shape(made));
             let spec = self.body_spec(name, Mode::Static, shape, &(pose * geom.pose), geom);
             let shape_name = geom.name.clone();
-            let spec = BodySpec { collides, visible: geom.visible, shape_name, ..spec };
+            let spec = BodySpec { collidable, visible: geom.visible, shape_name, ..spec };
             self.statics[body].push((k, self.scene.bodies.len()));
             let spec = self.with_ground(spec, geom, &(pose * geom.pose));
             self.scene.bodies.push(spec);
@@ -92,9 +92,9 @@ impl Assembly<'_, '_> {
         let (shape, shape_name) = joined(parts.iter().map(|(geom, shape)| (*geom, shape.clone())).collect());
         let name = self.taken.unique(self.name_of(body));
         let spec = self.body_spec(name, Mode::Kinematic, shape, &self.poses[body], first);
-        let collides = self.groups.collides(first);
+        let collidable = self.groups.collides(first);
         self.statics[body] = (0..self.bodies[body].geoms.len()).map(|k| (k, self.scene.bodies.len())).collect();
-        self.scene.bodies.push(BodySpec { collides, shape_name, ..spec });
+        self.scene.bodies.push(BodySpec { collidable, shape_name, ..spec });
     }
 
     /// Adds a free body as a rigid body. Returns whether that can express it.
@@ -155,7 +155,7 @@ impl Assembly<'_, '_> {
             locked: LockedAxes::default(),
             linear_damping_per_s: 0.0,
             angular_damping_per_s: 0.0,
-            collides: true,
+            collidable: true,
             group: surface.group,
             mask: surface.mask,
             sensor: false,

@@ -95,7 +95,7 @@ fn one(element: &Element<'_, '_>, kind: SensorKind, assembly: &Assembly<'_, '_>)
     let number = assembly.scene.sensors.len();
     let name = element.text("name").map_or_else(|| format!("sensor{number}"), super::defaults::cleaned);
     let (cutoff, noise) = (cutoff.unwrap_or(f64::INFINITY), SensorNoise::default());
-    Some(SensorSpec { name, kind, on, site, relative_to, volume, cutoff, noise, optics: None })
+    Some(SensorSpec { name, kind, on, site, relative_to, volume, cutoff, noise, optics: None, enabled: true })
 }
 
 fn on_link(assembly: &Assembly<'_, '_>, body: usize) -> bool {

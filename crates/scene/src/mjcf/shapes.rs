@@ -140,20 +140,21 @@ impl Meshes {
 /// Returns the shapes and visuals of a geom on a link; none if it is left out. `offset` is the pose
 /// of the body in the frame of the link.
 pub(super) fn on_link(geom: &Geom<'_>, groups: &Groups, reader: &Reader<'_>) -> Vec<LinkShape> {
-    let collides = groups.collides(geom);
-    if !collides && !geom.visible {
+    let collidable = groups.collides(geom);
+    if !collidable && !geom.visible {
         return Vec::new();
     }
     let surface = groups.surface(geom);
-    let part = |pose: Pose, geometry: Geometry, collides: bool, visible: bool| LinkShape {
+    let part = |pose: Pose, geometry: Geometry, collidable: bool, visible: bool| LinkShape {
         pose,
         geometry,
         mass: None,
         surface: surface.clone(),
-        collides,
+        collidable,
         visible,
-        name: geom.name.clone().filter(|_| collides),
+        name: geom.name.clone().filter(|_| collidable),
         one_way: None,
+        sensor: false,
     };
     let mut shapes = Vec::new();
     let mut visible = geom.visible;
@@ -168,20 +169,20 @@ pub(super) fn on_link(geom: &Geom<'_>, groups: &Groups, reader: &Reader<'_>) -> 
                 shapes.push(part(geom.pose * mesh.file_pose(), file, false, true));
                 visible = false;
             }
-            MeshFrom::Missing(why) if !collides => {
+            MeshFrom::Missing(why) if !collidable => {
                 reader.notes.add(&mesh.element, format!("left out of the picture: {why}"));
                 return shapes;
             }
             _ => {}
         }
     }
-    if collides || visible {
+    if collidable || visible {
         let geometry = match make(geom, reader) {
             Some(Made::Primitive(ShapeSpec::HalfSpace)) | None => return shapes,
             Some(Made::Primitive(shape)) => Geometry::Shape(shape),
             Some(Made::Solid(name, mesh)) => Geometry::Solid { name, mesh },
         };
-        shapes.push(part(geom.pose, geometry, collides, visible));
+        shapes.push(part(geom.pose, geometry, collidable, visible));
     }
     shapes
 }

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use tumble_core::Joint;
 use tumble_core::articulated::MAX_LINKS;
 use tumble_core::collide::Pose;
+use tumble_core::{Joint, Mode};
 
 use crate::mjcf::MjcfOptions;
-use crate::parse::body::{Library, read_name};
+use crate::parse::body::{Library, read_mode, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value, number_of};
 use crate::parse::link::{Inherited, LinkRow, LinkSpec, Surface};
@@ -37,6 +37,10 @@ pub struct ArticulatedSpec {
     pub exclude_collisions: Vec<[usize; 2]>,
     /// Whether links that overlap at time 0 never collide. True for a URDF.
     pub exclude_overlapping: bool,
+    /// Default `dynamic`.
+    pub mode: Mode,
+    /// Takes part in contacts. Default true.
+    pub collidable: bool,
     /// Takes part in the simulation. Default true.
     pub enabled: bool,
     /// Notes about the file that it was read from.
@@ -64,6 +68,8 @@ impl ArticulatedSpec {
             self_collision: true,
             exclude_collisions,
             exclude_overlapping: false,
+            mode: Mode::Dynamic,
+            collidable: true,
             enabled: true,
             notes,
         }
@@ -81,12 +87,13 @@ impl ArticulatedSpec {
             ..ArticulatedSpec::of(name, Vec::new())
         };
         (spec.self_collision, spec.enabled) = (f.flag_or("self_collision", true), f.flag_or("enabled", true));
+        (spec.mode, spec.collidable) = (read_mode(&mut f), f.flag_or("collidable", true));
         let from = Inherited {
             library,
             surface: &surface,
             floating,
             room: MAX_LINKS,
-            collides: f.flag_or("collides", true),
+            collidable: true,
             visible: f.flag_or("visible", true),
         };
         match (f.value("urdf"), f.value("mjcf"), f.value("sdformat")) {
@@ -168,7 +175,6 @@ impl ArticulatedSpec {
                     self.self_collision = read.self_collision;
                 }
                 for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
-                    shape.collides &= from.collides;
                     shape.visible &= from.visible;
                 }
                 Some(())
@@ -201,7 +207,6 @@ impl ArticulatedSpec {
                 self.links = robot.links;
                 self.notes = robot.notes;
                 for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
-                    shape.collides &= from.collides;
                     shape.visible &= from.visible;
                 }
                 Some(())
@@ -241,7 +246,6 @@ impl ArticulatedSpec {
         (self.links, self.exclude_collisions, self.notes) = (read.links, read.exclude_collisions, notes);
         let [named, color] = ["material", "color"].map(|key| f.value(key).is_some());
         for shape in self.links.iter_mut().flat_map(|link| &mut link.shapes) {
-            shape.collides &= from.collides;
             shape.visible &= from.visible;
             let (own, new) = (&mut shape.surface, from.surface);
             own.material = new.material;

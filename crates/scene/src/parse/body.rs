@@ -16,7 +16,8 @@ use crate::parse::rotation;
 use crate::parse::shape::{PartSurface, ShapeContext, ShapeSpec};
 use crate::parse::world::CONTACTS;
 
-const MODES: Names<Mode> = &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
+pub(crate) const MODES: Names<Mode> =
+    &[("dynamic", Mode::Dynamic), ("static", Mode::Static), ("kinematic", Mode::Kinematic)];
 
 /// Numbers of collision groups.
 pub(crate) const GROUPS: std::ops::RangeInclusive<u32> = 0..=63;
@@ -28,6 +29,8 @@ pub enum MassSpec {
     Mass(f64),
     /// Density, kg/m³.
     Density(f64),
+    /// The densities of the parts of a compound, and that of water, 1000 kg/m³, of other shapes.
+    Usual,
 }
 
 /// A rigid body at time 0 with all references resolved and all defaults filled in.
@@ -41,7 +44,7 @@ pub struct BodySpec {
     pub shape: ShapeSpec,
     /// Name of the shape; none for a compound, whose parts have names.
     pub shape_name: Option<String>,
-    /// Present for every dynamic body, except compounds whose parts have densities.
+    /// Present for every dynamic body.
     pub mass: Option<MassSpec>,
     /// Position of the origin of the *shape*, world axes, m. The center of mass of a mesh or a
     /// profile may be elsewhere: at `position_m` + R·(its position in the shape).
@@ -72,7 +75,7 @@ pub struct BodySpec {
     /// Rate at which angular velocity decays, 1/s. Default 0.
     pub angular_damping_per_s: f64,
     /// Takes part in contacts. Default true.
-    pub collides: bool,
+    pub collidable: bool,
     /// Collision group, 0 to 63. Default 0.
     pub group: CollisionGroup,
     /// Groups that it collides with, one bit each. Default all.
@@ -114,7 +117,7 @@ impl BodySpec {
         let surface = PartSurface { material, contact };
         let context = ShapeContext { meshes: &library.meshes, surface: Some((library, surface)) };
         let (shape, shape_name) = ShapeSpec::read(f, context).map_or((None, None), |(shape, name)| (Some(shape), name));
-        let mass = read_mass(f, mode, shape.as_ref().is_some_and(ShapeSpec::has_density));
+        let mass = read_mass(f, mode);
         let appearance = base.map_or_else(AppearanceSpec::default, |m| m.appearance.clone());
         let [linear, angular] = read_velocities(f, mode);
         let body = BodySpec {
@@ -136,7 +139,7 @@ impl BodySpec {
             locked: read_all_locked(f),
             linear_damping_per_s: f.number_or("linear_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
             angular_damping_per_s: f.number_or("angular_damping_per_s", Bound::NOT_NEGATIVE, 0.0),
-            collides: f.flag_or("collides", true),
+            collidable: f.flag_or("collidable", true),
             group: read_group(f, CollisionGroup::default()),
             mask: read_mask(f, u64::MAX),
             sensor: f.flag_or("sensor", false),
@@ -148,8 +151,7 @@ impl BodySpec {
             mounts: Mounts::read(f),
         };
         let shape = shape?;
-        let no_mass = mass.is_none() && !shape.has_density();
-        if (body.center_m.is_some() || body.inertia_kg_m2.is_some()) && no_mass {
+        if (body.center_m.is_some() || body.inertia_kg_m2.is_some()) && mass.is_none() {
             let message = format!("{} has `center_m` or `inertia_kg_m2` but no mass", f.what);
             f.log.report(f.span.clone(), message, "expected `mass_kg` or `density_kg_per_m3` with them");
         }
@@ -220,15 +222,15 @@ fn read_all_locked(f: &mut Fields<'_>) -> LockedAxes {
 }
 
 /// Reads the mode. A wrong value counts as kinematic, the mode that requires no other key.
-fn read_mode(f: &mut Fields<'_>) -> Mode {
+pub(crate) fn read_mode(f: &mut Fields<'_>) -> Mode {
     match f.value("mode") {
         Some(value) => f.as_choice("mode", value, MODES).unwrap_or(Mode::Kinematic),
         None => Mode::Dynamic,
     }
 }
 
-/// Reads the mass; a dynamic body requires it, unless its shape has densities of its own.
-fn read_mass(f: &mut Fields<'_>, mode: Mode, has_density: bool) -> Option<MassSpec> {
+/// Reads the mass; a dynamic body without one, and a compound with densities, have the usual one.
+fn read_mass(f: &mut Fields<'_>, mode: Mode) -> Option<MassSpec> {
     let mass = f.optional_number("mass_kg", Bound::POSITIVE);
     let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
     match (mass, density) {
@@ -239,15 +241,7 @@ fn read_mass(f: &mut Fields<'_>, mode: Mode, has_density: bool) -> Option<MassSp
         }
         (Some(mass), None) => Some(MassSpec::Mass(mass)),
         (None, Some(density)) => Some(MassSpec::Density(density)),
-        (None, None) => {
-            if mode == Mode::Dynamic && !has_density {
-                f.missing(
-                    "mass_kg",
-                    "`mass_kg` or `density_kg_per_m3`, or mode = \"static\" for a body that never moves",
-                );
-            }
-            None
-        }
+        (None, None) => (mode == Mode::Dynamic).then_some(MassSpec::Usual),
     }
 }
 

@@ -23,6 +23,12 @@ impl Bound {
         Bound { min: MIN_POSITIVE, max: MAX_MAGNITUDE, expected: "a number greater than 0 (from 1e-9 to 1e12)" };
     /// From 0 to 1e12.
     pub(crate) const NOT_NEGATIVE: Bound = Bound { min: 0.0, max: MAX_MAGNITUDE, expected: "a number of at least 0" };
+    /// A limit of a position, infinite for none on its side.
+    pub(crate) const LIMIT: Bound = Bound {
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        expected: "a number from -1e12 to 1e12, or inf or -inf for no limit on that side",
+    };
     /// From 0 to 1.
     pub(crate) const UNIT: Bound = Bound { min: 0.0, max: 1.0, expected: "a number from 0 to 1" };
 

@@ -64,6 +64,8 @@ pub struct EventSpec {
     pub times: u32,
     /// `do`, in its order.
     pub actions: Vec<Action<String>>,
+    /// Whether it can fire and has an effect. Default true.
+    pub enabled: bool,
 }
 
 /// The kind of object that a name stands for.
@@ -71,8 +73,8 @@ pub struct EventSpec {
 pub(crate) enum ObjectKind {
     /// A rigid body.
     Body { mode: Mode, sensor: bool },
-    /// An articulated body.
-    Articulated,
+    /// An articulated body, and whether a link of it has a sensor.
+    Articulated { sensor: bool },
     /// One of its links.
     Link,
     /// A loop joint.
@@ -83,11 +85,13 @@ pub(crate) enum ObjectKind {
     Template(usize),
     /// An event.
     Event,
+    /// A measuring sensor, a soft body, particles, a flock, a boid or a field.
+    Other,
 }
 
 impl ObjectKind {
     pub(crate) fn is_body(self) -> bool {
-        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Link)
+        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Link)
     }
 
     /// Returns whether it is an object of its own, and not a part of one.
@@ -160,8 +164,9 @@ impl ObjectNames {
             if let Some(ObjectKind::Template(count)) = self.0.get(name) {
                 return body_names(name, *count).collect();
             }
-            let right =
-                |kind| matches!(kind, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Template(_));
+            let right = |kind| {
+                matches!(kind, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Template(_))
+            };
             self.check(f, key, value, name, right, EXPECTED).into_iter().collect()
         };
         match value.get_ref().as_array() {
@@ -189,6 +194,7 @@ impl EventSpec {
         let when = when.and_then(|fields| read_trigger(fields, names));
         let delay_s = f.number_or("delay_s", Bound::NOT_NEGATIVE, 0.0);
         let times = f.integer_or("times", 1..=u32::MAX, u32::MAX);
+        let enabled = f.flag_or("enabled", true);
         let others = when.as_ref().map(|when| (when.has_other(), !when.others().is_empty()));
         let mut actions = Vec::new();
         for fields in f.tables("do", MAX_ACTIONS) {
@@ -198,7 +204,7 @@ impl EventSpec {
             f.missing("do", "a list of what is done, such as [{ push = \"ball\", impulse_n_s = [0, 0, 1] }]");
         }
         f.finish();
-        Some(EventSpec { name, when: when?, delay_s, times, actions })
+        Some(EventSpec { name, when: when?, delay_s, times, actions, enabled })
     }
 }
 
@@ -232,8 +238,10 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             Some(Trigger::Parting { a, b })
         }
         "enters" | "leaves" => {
-            let sensor = |kind| matches!(kind, ObjectKind::Body { sensor: true, .. });
-            let sensor = names.read(&mut f, key, sensor, "the name of a body with `sensor = true`");
+            let sensor =
+                |kind| matches!(kind, ObjectKind::Body { sensor: true, .. } | ObjectKind::Articulated { sensor: true });
+            let expected = "the name of a body, or of an articulated body with a shape, that has `sensor = true`";
+            let sensor = names.read(&mut f, key, sensor, expected);
             let bodies = f.value("bodies").map_or(Vec::new(), |value| names.side(&f, "bodies", value));
             sensor.map(|sensor| match key {
                 "enters" => Trigger::Enters { sensor, bodies },

@@ -82,7 +82,7 @@ pub(crate) fn read_action(
         }
         "move" => read_move(&mut f, names),
         "drive" => {
-            let right = |kind| matches!(kind, ObjectKind::Link | ObjectKind::Joint | ObjectKind::Articulated);
+            let right = |kind| matches!(kind, ObjectKind::Link | ObjectKind::Joint | ObjectKind::Articulated { .. });
             let body = names.read(&mut f, "drive", right, "the name of a loop joint, or \"OBJECT/LINK\"");
             let target = read_target(&mut f);
             body.map(|body| Action::Drive { body, dof: 0, target, original: None })
@@ -113,7 +113,12 @@ fn read_who(
 }
 
 fn read_object(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Option<String> {
-    names.read(f, key, ObjectKind::is_object, "the name of a body, joint or event")
+    names.read(
+        f,
+        key,
+        ObjectKind::is_object,
+        "the name of a body, a joint, a sensor, a behavior, or an event above this one",
+    )
 }
 
 fn read_joint(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Option<String> {

@@ -208,6 +208,20 @@ impl<'a> Fields<'a> {
         *range.start()
     }
 
+    /// Returns the key `seed`, a whole number of 64 bits, or 0 if it is absent.
+    pub(crate) fn seed(&mut self) -> u64 {
+        const EXPECTED: &str = "a whole number from 0 to 18446744073709551615";
+        let Some(value) = self.value("seed") else { return 0 };
+        match value.get_ref() {
+            DeValue::Integer(digits) => match u64::from_str_radix(digits.as_str(), digits.radix()) {
+                Ok(seed) => return seed,
+                Err(_) => self.wrong("seed", value, EXPECTED),
+            },
+            _ => self.wrong_type("seed", value, EXPECTED),
+        }
+        0
+    }
+
     // Lists of numbers.
 
     /// Returns `N` numbers in `bound`, if the key is present.

@@ -146,7 +146,7 @@ impl SceneFile {
         let loop_joints = read_loop_joints(&mut f, &objects, &mut names);
         let joints = Joints { articulated: &articulated, loop_joints: &loop_joints };
         let mimics = read_mimics(&mut f, &joints, &mut names);
-        let sensors = read_sensors(&mut f, &objects, &loop_joints, &mut names);
+        let sensors = read_sensors(&mut f, &library, &objects, &loop_joints, &mut names);
         let pairs = read_pairs(&mut f, &library, &objects);
         let behaviors = BehaviorSpecs::read(&mut f, &library, &objects, |table, name| {
             note_unique(table.log, "object", &mut names, name, &table.span);
@@ -159,7 +159,10 @@ impl SceneFile {
         if lights.is_empty() {
             lights.push(LightSpec::sun());
         }
-        let named = object_names(&bodies, &articulated, &loop_joints, &mimics, &templates);
+        let mut named = object_names(&bodies, &articulated, &loop_joints, &mimics, &templates);
+        let of_behaviors = behaviors.names().into_iter();
+        let others = sensors.iter().map(|sensor: &SensorSpec| sensor.name.clone()).chain(of_behaviors);
+        others.for_each(|name| named.add(&name, ObjectKind::Other));
         let events = read_events(&mut f, named, lights.len(), &mut names);
         let sky = read_table(&mut f, "sky", SkySpec::read).unwrap_or_default();
         let ground = read_table(&mut f, "ground", GroundSpec::read);
@@ -348,7 +351,8 @@ fn object_names(
     let mut names = ObjectNames::default();
     bodies.iter().for_each(|body| names.add(&body.name, ObjectKind::Body { mode: body.mode, sensor: body.sensor }));
     for spec in articulated {
-        names.add(&spec.name, ObjectKind::Articulated);
+        let sensor = spec.links.iter().flat_map(|link| &link.shapes).any(|shape| shape.sensor && shape.collidable);
+        names.add(&spec.name, ObjectKind::Articulated { sensor });
         spec.links.iter().for_each(|link| names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link));
     }
     loop_joints.iter().for_each(|joint| names.add(&joint.name, ObjectKind::Joint));
@@ -383,13 +387,14 @@ fn read_mimics(f: &mut Fields<'_>, joints: &Joints<'_>, names: &mut Taken) -> Ve
 
 fn read_sensors(
     f: &mut Fields<'_>,
+    library: &Library<'_>,
     objects: &Objects<'_>,
     joints: &[LoopJointSpec],
     names: &mut Taken,
 ) -> Vec<SensorSpec> {
     let one = |mut table: Fields<'_>| {
         let (log, place) = (table.log, name_span(&mut table));
-        let spec = SensorSpec::read(table, objects, joints)?;
+        let spec = SensorSpec::read(table, library, objects, joints)?;
         if !spec.name.is_empty() {
             note_unique(log, "object", names, &spec.name, &place);
         }

@@ -380,9 +380,10 @@ pub(crate) fn read_limits(f: &mut Fields<'_>, key: Key) -> Option<Option<[f64; 2
             return Some(None);
         }
         let problems = f.log.count();
-        let limits: [f64; 2] = f.as_vector(key, value, Bound::ANY);
-        if limits[0] > limits[1] && f.log.count() == problems {
-            f.wrong(key, value, "[lower, upper], the lower first; or false for none");
+        let limits: [f64; 2] = f.as_vector(key, value, Bound::LIMIT);
+        let [lower, upper] = limits;
+        if f.log.count() == problems && (lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY) {
+            f.wrong(key, value, "[lower, upper], the lower first, -inf and inf for none on a side; or false for none");
         }
         Some(Some(limits.map(|x| x * scale)))
     };

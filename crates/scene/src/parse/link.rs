@@ -84,13 +84,15 @@ pub struct LinkShape {
     /// Surface and appearance.
     pub surface: Surface,
     /// Takes part in contacts.
-    pub collides: bool,
+    pub collidable: bool,
     /// Is drawn.
     pub visible: bool,
     /// Name, unlike those of all other shapes of the link; none for a compound, whose parts have names.
     pub name: Option<String>,
     /// Direction, of any length above 0, in the shape's own axes, of a shape that collides on one side only.
     pub one_way: Option<[f64; 3]>,
+    /// Is a sensor: it has no contacts, and the world reports the bodies that overlap it.
+    pub sensor: bool,
 }
 
 /// The geometry of a shape on a link.
@@ -183,7 +185,7 @@ pub(crate) struct LinkRow<'a> {
 pub(crate) struct Inherited<'l, 's> {
     pub(crate) library: &'l Library<'l>,
     pub(crate) surface: &'s Surface,
-    pub(crate) collides: bool,
+    pub(crate) collidable: bool,
     pub(crate) visible: bool,
     /// Whether a link without a parent floats.
     pub(crate) floating: bool,
@@ -205,12 +207,16 @@ impl<'a> LinkRow<'a> {
             library: from.library,
             floating: from.floating,
             room: from.room,
-            collides: f.flag_or("collides", from.collides),
+            collidable: f.flag_or("collidable", from.collidable),
             visible: f.flag_or("visible", from.visible),
         };
-        let shapes = read_shapes(f, &from);
+        let mut shapes = read_shapes(f, &from);
         let mounts = Mounts::read(f);
-        let mass = read_mass(f, &shapes, joint.as_ref().is_some_and(|j| j.kind == Joint::Fixed));
+        let mass = read_mass(f, &shapes);
+        if mass == LinkMassSpec::OfShapes {
+            let solid = |shape: &&mut LinkShape| matches!(shape.geometry, Geometry::Shape(_));
+            shapes.iter_mut().filter(solid).for_each(|shape| shape.mass = shape.mass.or(Some(MassSpec::Usual)));
+        }
         let (count, next, colors) = read_repeat(f, from.room);
         let mut joint = joint?;
         let mimic = joint.read_mimic(f);
@@ -312,10 +318,11 @@ impl LinkShape {
             geometry: Geometry::Shape(shape),
             mass: mass.or(density),
             surface,
-            collides: f.flag_or("collides", from.collides),
+            collidable: f.flag_or("collidable", from.collidable),
             visible: f.flag_or("visible", from.visible),
             name,
             one_way: read_direction(&mut f, "one_way"),
+            sensor: f.flag_or("sensor", false),
         };
         f.finish();
         Some(read)
@@ -333,12 +340,23 @@ impl LinkShape {
         let place = f.what.clone();
         f.finish();
         let geometry = Geometry::File { path: path?, scale: [scale; 3], place, hull: false, required: true };
-        Some(LinkShape { pose, geometry, mass: None, surface, collides: false, visible, name: None, one_way: None })
+        let (name, one_way) = (None, None);
+        Some(LinkShape {
+            pose,
+            geometry,
+            mass: None,
+            surface,
+            collidable: false,
+            visible,
+            name,
+            one_way,
+            sensor: false,
+        })
     }
 }
 
-fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassSpec {
-    let mass = f.optional_number("mass_kg", Bound::POSITIVE);
+fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape]) -> LinkMassSpec {
+    let mass = f.optional_number("mass_kg", Bound::NOT_NEGATIVE);
     let density = f.optional_number("density_kg_per_m3", Bound::POSITIVE);
     let center = f.optional_vector::<3>("center_m", Bound::ANY);
     let inertia = read_inertia(f);
@@ -358,13 +376,6 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
             "has `center_m` but no `inertia_kg_m2`",
             "expected both, or neither: the mass is then distributed over the shapes",
         );
-    } else if own > 0 && own < solids {
-        contradiction(
-            "has shapes with a mass and shapes without",
-            "expected a mass for each shape, or one for the link",
-        );
-    } else if !given && own == 0 && solids > 0 && !fixed {
-        f.missing("mass_kg", "`mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes");
     } else if density.is_some() && solids == 0 {
         contradiction(
             "has a density but no shape",
@@ -372,7 +383,7 @@ fn read_mass(f: &mut Fields<'_>, shapes: &[LinkShape], fixed: bool) -> LinkMassS
         );
     }
     match (mass, density) {
-        (Some(mass), _) if inertia.is_some() || solids == 0 => {
+        (Some(mass), _) if inertia.is_some() || solids == 0 || mass == 0.0 => {
             let center = Vec3::from(center.unwrap_or_default());
             LinkMassSpec::Given(LinkMass { mass, center, inertia: inertia.unwrap_or_default() })
         }

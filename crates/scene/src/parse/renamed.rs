@@ -6,6 +6,7 @@ const KEYS: &[(&str, &str)] = &[
     ("ahead", "forward"),
     ("alive", "enabled"),
     ("closure", "loop_joint"),
+    ("collides", "collidable"),
     ("keep_apart", "exclude_collisions"),
     ("limit_n", "max_force_n"),
     ("limit_n_m", "max_torque_n_m"),

@@ -1,11 +1,9 @@
 //! `[[sensor]]`: a measuring sensor on a body, a link, a loop joint or the world.
 
-use std::collections::BTreeMap;
-
 use tumble_core::collide::Pose;
 use tumble_core::{MAX_DELAY, Optics, SensorKind, SensorNoise};
 
-use crate::parse::body::read_name;
+use crate::parse::body::{Library, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec, Parts};
@@ -44,6 +42,8 @@ pub struct SensorSpec {
     pub noise: SensorNoise,
     /// Resolution and angle of view of a camera.
     pub optics: Option<Optics>,
+    /// Whether it is read. Default true.
+    pub enabled: bool,
 }
 
 const KINDS: Names<SensorKind> = &{
@@ -57,7 +57,12 @@ const KINDS: Names<SensorKind> = &{
 };
 
 impl SensorSpec {
-    pub(crate) fn read(mut f: Fields<'_>, parts: &impl Parts, joints: &[LoopJointSpec]) -> Option<SensorSpec> {
+    pub(crate) fn read(
+        mut f: Fields<'_>,
+        library: &Library<'_>,
+        parts: &impl Parts,
+        joints: &[LoopJointSpec],
+    ) -> Option<SensorSpec> {
         let name = read_name(&mut f).unwrap_or_default();
         let Some(kind) = f.choice("type", KINDS) else {
             f.give_up();
@@ -66,7 +71,7 @@ impl SensorSpec {
         let on = f.optional_text("on");
         let relative_to = if kind.has_reference() { f.optional_text("relative_to") } else { None };
         let site = if kind.reads_dof() { Pose::identity() } else { rotation::read_pose(&mut f) };
-        let volume = if kind == SensorKind::Touch { read_volume(&mut f) } else { None };
+        let volume = if kind == SensorKind::Touch { read_volume(&mut f, library) } else { None };
         let oriented = kind == SensorKind::Orientation;
         let cutoff = if oriented { f64::INFINITY } else { f.number_or("cutoff", Bound::POSITIVE, f64::INFINITY) };
         let optics = kind.is_camera().then(|| read_optics(&mut f));
@@ -78,8 +83,9 @@ impl SensorSpec {
             bias_walk: number(&mut f, "bias_walk", optics.is_none()),
             quantization: number(&mut f, "quantization", scaled),
             delay: if optics.is_none() { f.integer_or("delay", 0..=MAX_DELAY, 0) } else { 0 },
-            seed: if noisy { u64::from(f.integer_or("seed", 0..=u32::MAX, 0)) } else { 0 },
+            seed: if noisy { f.seed() } else { 0 },
         };
+        let enabled = f.flag_or("enabled", true);
         let place = match on {
             None if kind.reads_dof() || kind.reads_joint() || kind == SensorKind::Touch => {
                 f.missing("on", "the name of a body, \"OBJECT/LINK\" or a loop joint");
@@ -105,7 +111,18 @@ impl SensorSpec {
             found
         });
         f.finish();
-        Some(SensorSpec { name, kind, on: place?, site, relative_to: reference, volume, cutoff, noise, optics })
+        Some(SensorSpec {
+            name,
+            kind,
+            on: place?,
+            site,
+            relative_to: reference,
+            volume,
+            cutoff,
+            noise,
+            optics,
+            enabled,
+        })
     }
 }
 
@@ -131,12 +148,12 @@ fn read_optics(f: &mut Fields<'_>) -> Optics {
     Optics { resolution, vertical_fov }
 }
 
-/// Reads `volume`, a shape without a mesh.
-fn read_volume(f: &mut Fields<'_>) -> Option<ShapeSpec> {
+/// Reads `volume`.
+fn read_volume(f: &mut Fields<'_>, library: &Library<'_>) -> Option<ShapeSpec> {
     let value = f.value("volume")?;
     let example = "{ type = \"sphere\", radius_m = 0.05 }";
     let mut own = Fields::of(f.log, value, format!("the volume of {}", f.what), example)?;
-    let shape = ShapeSpec::read_part(&mut own, ShapeContext::of_meshes(&BTreeMap::new()));
+    let shape = ShapeSpec::read_part(&mut own, ShapeContext::of_meshes(&library.meshes));
     own.finish();
     shape
 }

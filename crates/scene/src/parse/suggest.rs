@@ -103,7 +103,7 @@ mod tests {
             nearest("damping_n_s_per_m", ["friction_n_m", "damping_n_m_s_per_rad"]),
             Some("damping_n_m_s_per_rad")
         );
-        assert_eq!(nearest("mass_m", ["color", "collides"]), None);
+        assert_eq!(nearest("mass_m", ["color", "collidable"]), None);
     }
 
     #[test]

@@ -182,7 +182,7 @@ pub struct WorldSettings {
     pub integrator_tolerance: f64,
     /// Default `gauss_seidel`.
     pub solver: Solver,
-    /// Largest number of sweeps of the iterative solver per solve, 1 to 100 000. Default 200.
+    /// Largest number of sweeps of the iterative solver per solve, 1 to 1 000 000. Default 200.
     pub iterations: u32,
     /// Largest work of a step in block relaxations, 1 to 4e9. Default: no bound.
     pub budget: Option<u32>,
@@ -203,6 +203,19 @@ pub struct WorldSettings {
     pub event_impulse_n_s: f64,
     /// Largest angle by which forces of joints may turn a part back and forth in a sub-step, rad. Default 1.
     pub max_turn_rad: f64,
+    /// Depth that a lasting contact may reach within a sub-step, meters. Default: 1e-4, or the contact tolerance if that is
+    /// larger.
+    pub drift_tolerance_m: Option<f64>,
+    /// Largest speed at which existing penetration is corrected, m/s. Default 3.
+    pub recovery_speed_m_per_s: f64,
+    /// Largest number of sweeps of the correction of overlap. Default 15.
+    pub projection_sweeps: u32,
+    /// Whether positions of joints are corrected. Default true.
+    pub stabilize_positions: bool,
+    /// A sweep that changes no velocity by more than this ends a solve, m/s. Default 1e-9.
+    pub solver_tolerance_m_per_s: f64,
+    /// Largest number of block relaxations of a step in sweeps beyond the first 25. Default 20 000.
+    pub max_relaxations: u32,
     /// Contact mode of meshes and cylinders without their own. Default `surface`.
     pub contacts: ContactMode,
     /// Threads of a step, 0 for as many as cores; no number changes the result. Default 1.
@@ -229,6 +242,12 @@ impl Default for WorldSettings {
             combine_friction: Combine::GeometricMean,
             event_impulse_n_s: 0.0,
             max_turn_rad: 1.0,
+            drift_tolerance_m: None,
+            recovery_speed_m_per_s: 3.0,
+            projection_sweeps: 15,
+            stabilize_positions: true,
+            solver_tolerance_m_per_s: 1e-9,
+            max_relaxations: 20_000,
             contacts: ContactMode::Surface,
             threads: 1,
         }
@@ -254,7 +273,7 @@ impl WorldSettings {
             integrator: f.choice_or("integrator", Integrator::NAMES, default.integrator),
             integrator_tolerance: f.number_or("integrator_tolerance", ACCURACY, default.integrator_tolerance),
             solver: f.choice_or("solver", Solver::NAMES, default.solver),
-            iterations: f.integer_or("iterations", 1..=100_000, default.iterations),
+            iterations: f.integer_or("iterations", 1..=1_000_000, default.iterations),
             budget: f.optional_integer("budget", 1..=4_000_000_000),
             contact_tolerance_m: f.number_or("contact_tolerance_m", TOLERANCE, default.contact_tolerance_m),
             sleep_after_s: f.optional_number("sleep_after_s", AFTER),
@@ -263,9 +282,29 @@ impl WorldSettings {
             combine_friction: f.choice_or("combine_friction", Combine::NAMES, default.combine_friction),
             event_impulse_n_s: f.number_or("event_impulse_n_s", Bound::NOT_NEGATIVE, default.event_impulse_n_s),
             max_turn_rad: f.number_or("max_turn_rad", TURN, default.max_turn_rad),
+            drift_tolerance_m: f.optional_number("drift_tolerance_m", TOLERANCE),
+            recovery_speed_m_per_s: f.number_or(
+                "recovery_speed_m_per_s",
+                Bound::NOT_NEGATIVE,
+                default.recovery_speed_m_per_s,
+            ),
+            projection_sweeps: f.integer_or("projection_sweeps", 0..=u32::MAX, default.projection_sweeps),
+            stabilize_positions: f.flag_or("stabilize_positions", default.stabilize_positions),
+            solver_tolerance_m_per_s: f.number_or(
+                "solver_tolerance_m_per_s",
+                Bound::NOT_NEGATIVE,
+                default.solver_tolerance_m_per_s,
+            ),
+            max_relaxations: f.integer_or("max_relaxations", 0..=u32::MAX, default.max_relaxations),
             contacts: f.choice_or("contacts", CONTACTS, default.contacts),
             threads: f.integer_or("threads", 0..=256, default.threads),
         };
+        if let Some(value) = f.value("drift_tolerance_m")
+            && world.drift_tolerance_m.is_some_and(|drift| drift < world.contact_tolerance_m)
+        {
+            let least = world.contact_tolerance_m;
+            f.wrong("drift_tolerance_m", value, format!("at least the contact tolerance, {least} m"));
+        }
         f.finish();
         world
     }

@@ -1,12 +1,12 @@
-//! `[[articulated]]` of an articulated body as it stands. Links that are folded into others become
-//! fixed links without mass: the mass of a moving link contains theirs.
+//! `[[articulated]]` of an articulated body as it stands. Shapes of links that are folded into others are those of the
+//! moving link that carries them.
 
 use tumble_core::articulated::{DofSettings, Drive, Link, LinkFrame, LinkMass};
 use tumble_core::collide::{ContactMode, Pose, Shape, Vec3};
 use tumble_core::{ArticulatedBody, Collider, Joint, Object, ObjectId, Visual, VisualGeometry};
 
 use super::Writer;
-use super::bodies::inertia;
+use super::bodies::{self, inertia};
 use super::shapes::is_same;
 use super::surface;
 use super::text::Table;
@@ -28,10 +28,9 @@ impl Writer<'_> {
         t.put_unless(false, "floating", floating);
         t.put_unless(true, "self_collision", body.self_collision);
         if let Some(status) = self.world.status(id) {
+            t.put_unless("dynamic", "mode", bodies::mode(status.mode));
+            t.put_unless(true, "collidable", status.collidable);
             t.put_unless(true, "enabled", status.enabled);
-            if !status.collidable || status.mode != tumble_core::Mode::Dynamic {
-                self.fault(format!("articulated \"{name}\": a mode or collisions of the whole body"));
-            }
         }
         if let Some(root) = model.links().iter().find(|link| link.joint == Joint::Floating) {
             let rates = &state[model.positions() + root.v..model.positions() + root.v + 6];
@@ -67,7 +66,7 @@ impl Writer<'_> {
 
     fn moving_link(&mut self, body: &ArticulatedBody, k: usize, state: &[f64], joint: Option<&String>) -> Table {
         let (model, link) = (body.model(), &body.model().links()[k]);
-        let Link { name, parent, joint: kind, placement, mass, q, v, armature } = link;
+        let Link { name, parent, joint: kind, placement, mass: _, q, v, armature } = link;
         let mut t = Table::of("name", name);
         parent.iter().for_each(|parent| t.put("parent", &model.links()[*parent].name));
         let placement = match kind {
@@ -128,29 +127,29 @@ impl Writer<'_> {
                 t.extend(resistance(dof));
             }
         }
-        if *mass != LinkMass::none() {
-            t.put("mass_kg", mass.mass);
-            t.put("center_m", mass.center);
-            t.put("inertia_kg_m2", inertia(&mass.inertia));
-        }
         t.extend(self.mounts(body, k));
-        t.extend(self.shapes(body, name, &carried(body, Some(k)), &Pose::identity()));
+        let shapes = self.shapes(body, name, &carried(body, Some(k)), &Pose::identity());
+        t.extend(mass_of(&body.link_mass(name).unwrap_or_else(LinkMass::none), !shapes.is_empty()));
+        t.extend(shapes);
         t
     }
 
     /// Writes a link without a joint. The first one on the base has everything that is fixed to the
     /// base.
     fn fixed_link(&mut self, body: &ArticulatedBody, frame: &LinkFrame) -> Table {
-        let LinkFrame { name, link, pose } = frame;
+        let LinkFrame { name, link, pose, mass } = frame;
         let mut t = Table::of("name", name);
         link.iter().for_each(|link| t.put("parent", &body.model().links()[*link].name));
         t.put_pose(pose);
         t.put("joint", "fixed");
         let first = body.model().frames().iter().find(|f| f.link.is_none()).is_some_and(|f| f.name == *name);
+        let mut shapes = Table::default();
         if first {
             t.extend(self.mounts(body, body.model().links().len()));
-            t.extend(self.shapes(body, name, &carried(body, None), pose));
+            shapes = self.shapes(body, name, &carried(body, None), pose);
         }
+        t.extend(mass_of(mass, !shapes.is_empty()));
+        t.extend(shapes);
         t
     }
 
@@ -174,8 +173,18 @@ impl Writer<'_> {
         let mut list = Vec::new();
         for (part, collider) in &carried.colliders {
             // the names and surfaces of shapes are read from the body below
-            let Collider { pose, shape, material, contact_mode, group, mask, name: _, shape_materials: _, one_way } =
-                collider;
+            let Collider {
+                pose,
+                shape,
+                material,
+                contact_mode,
+                group,
+                mask,
+                name: _,
+                shape_materials: _,
+                one_way,
+                sensor,
+            } = collider;
             let drawn = left.iter().position(|visual| {
                 matches!(&visual.geometry, VisualGeometry::Shape(s) if is_same(s, shape)) && visual.pose == *pose
             });
@@ -187,6 +196,7 @@ impl Writer<'_> {
             t.put_unless(ContactMode::Surface, "contacts", *contact_mode);
             t.extend(surface::groups(*group, *mask));
             one_way.iter().for_each(|direction| t.put("one_way", *direction));
+            t.put_unless(false, "sensor", *sensor);
             match visual {
                 Some(visual) => t.extend(self.visual_look(link, visual, &shape.center_of_mass(), &look)),
                 None => t.put("visible", false),
@@ -205,7 +215,7 @@ impl Writer<'_> {
         let (mut t, center) = match &visual.geometry {
             VisualGeometry::Shape(shape) => {
                 let mut t = self.meshes.shape(shape);
-                t.put("collides", false);
+                t.put("collidable", false);
                 t.put_pose(&(frame.inverse() * visual.pose * about_frame(shape)));
                 (t, shape.center_of_mass())
             }
@@ -229,6 +239,19 @@ impl Writer<'_> {
         self.note_shader(link, visual);
         surface::appearance(&visual.appearance, center, base)
     }
+}
+
+/// Returns the mass of a link in numbers; a link with shapes would have that of water without them.
+fn mass_of(mass: &LinkMass, has_shapes: bool) -> Table {
+    let mut t = Table::default();
+    if *mass != LinkMass::none() {
+        t.put("mass_kg", mass.mass);
+        t.put("center_m", mass.center);
+        t.put("inertia_kg_m2", inertia(&mass.inertia));
+    } else if has_shapes {
+        t.put("mass_kg", 0.0);
+    }
+    t
 }
 
 /// Returns colliders and visuals of a moving link, or of the base.

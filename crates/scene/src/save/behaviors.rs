@@ -19,11 +19,11 @@ impl Writer<'_> {
     pub(super) fn behavior(&mut self, id: ObjectId, name: &str) -> bool {
         let world = self.world;
         if let Some(mesh) = world.get::<SpringMesh>(id) {
-            self.mesh(name, mesh);
+            self.mesh(id, name, mesh);
         } else if let Some(system) = world.get::<ParticleSystem>(id) {
-            self.particles(name, system);
+            self.particles(id, name, system);
         } else if let Some(flock) = world.get::<Flock>(id) {
-            self.flock(name, flock);
+            self.flock(id, name, flock);
         } else if world.get::<Boid>(id).is_some() {
             let in_flock =
                 |other: &ObjectId| world.get::<Flock>(*other).is_some_and(|flock| flock.boids().contains(&id));
@@ -40,41 +40,60 @@ impl Writer<'_> {
                     t.put("drag_coefficient", coefficient);
                 }
             }
-            self.field(t, wind.targets());
+            self.field(id, t, wind.targets());
         } else if let Some(attractor) = world.get::<Attractor>(id) {
             let mut t = field(name, "attractor");
             t.put_unless(Vec3::zeros(), "position_m", attractor.center());
             t.put("strength_m3_per_s2", attractor.strength());
             t.put_unless(0.0, "softening_m", attractor.softening());
-            self.field(t, attractor.targets());
+            self.field(id, t, attractor.targets());
         } else if let Some(explosion) = world.get::<Explosion>(id) {
             let mut t = field(name, "explosion");
             t.put_unless(Vec3::zeros(), "position_m", explosion.center());
             t.put("impulse_n_s", explosion.impulse());
             t.put("start_s", explosion.time());
             t.put("decay_s", explosion.decay());
-            self.field(t, explosion.targets());
+            self.field(id, t, explosion.targets());
         } else if let Some(fluid) = world.get::<Buoyancy>(id) {
             let mut t = field(name, "buoyancy");
             t.put_unless(Vec3::zeros(), "position_m", fluid.surface());
             t.put("density_kg_per_m3", fluid.density());
             t.put("drag_per_s", fluid.drag());
             t.put_unless(Vec3::zeros(), "current_m_per_s", fluid.current());
-            self.field(t, fluid.targets());
+            self.field(id, t, fluid.targets());
         } else if let Some(panels) = world.get::<Panels>(id) {
-            self.panels(name, panels);
+            self.panels(id, name, panels);
         } else if let Some(flock) = world.get::<BodyFlock>(id) {
-            self.body_flock(name, flock);
+            self.body_flock(id, name, flock);
         } else {
             return false;
-        }
-        if world.status(id).is_some_and(|status| !status.enabled || !status.collidable) {
-            self.fault(format!("\"{name}\", a disabled behavior"));
         }
         true
     }
 
-    fn mesh(&mut self, name: &str, mesh: &SpringMesh) {
+    /// Returns what tells an object from one that is enabled.
+    fn enabled(&mut self, id: ObjectId) -> Table {
+        let mut t = Table::default();
+        let status = self.world.status(id);
+        t.put_unless(true, "enabled", status.is_none_or(|status| status.enabled));
+        if status.is_some_and(|status| !status.collidable) {
+            let name = self.world.name(id).unwrap_or_default();
+            self.fault(format!("\"{name}\", which is not collidable and has no shape"));
+        }
+        t
+    }
+
+    /// Returns what tells an object from one that is enabled and collides.
+    fn status(&self, id: ObjectId) -> Table {
+        let mut t = Table::default();
+        if let Some(status) = self.world.status(id) {
+            t.put_unless(true, "collidable", status.collidable);
+            t.put_unless(true, "enabled", status.enabled);
+        }
+        t
+    }
+
+    fn mesh(&mut self, id: ObjectId, name: &str, mesh: &SpringMesh) {
         let Some(origin) = mesh.origin() else {
             return self.fault(format!("\"{name}\", a mesh of springs that is no grid"));
         };
@@ -107,10 +126,11 @@ impl Writer<'_> {
         if let Some(surface) = mesh.surface() {
             t.extend(surface::appearance(&surface.appearance, &Vec3::zeros(), &look));
         }
+        t.extend(self.status(id));
         self.out += &t.under(header);
     }
 
-    fn particles(&mut self, name: &str, system: &ParticleSystem) {
+    fn particles(&mut self, id: ObjectId, name: &str, system: &ParticleSystem) {
         let mut t = Table::of("name", name);
         let &ParticleSettings {
             capacity,
@@ -122,7 +142,7 @@ impl Writer<'_> {
             linear_drag,
             quadratic_drag,
             wind,
-            collides,
+            collidable,
             group,
             mask,
             two_way,
@@ -130,17 +150,14 @@ impl Writer<'_> {
         let (contact, base) = self.surface_of(material, &mut t);
         t.extend(surface::contact(material, &contact));
         t.put("capacity", capacity as u32);
-        match u32::try_from(seed) {
-            Ok(seed) => t.put_unless(0, "seed", seed),
-            Err(_) => self.fault(format!("\"{name}\": its seed {seed}, above 32 bits")),
-        }
+        t.put_unless(0, "seed", seed);
         t.put("mass_kg", mass);
         t.put("radius_m", radius);
         t.put_unless(1.0, "gravity_scale", gravity_scale);
         t.put_unless(0.0, "linear_drag_per_s", linear_drag);
         t.put_unless(0.0, "quadratic_drag_per_m", quadratic_drag);
         t.put_unless(Vec3::zeros(), "wind_m_per_s", wind);
-        t.put_unless(true, "collides", collides);
+        t.put_unless(true, "collidable", collidable);
         t.extend(surface::groups(group, mask));
         t.put_unless(false, "two_way", two_way);
         let look = system.look();
@@ -150,6 +167,7 @@ impl Writer<'_> {
         t.put_unless([1.0; 2], "scale", look.scale);
         look.end_color.iter().for_each(|color| t.put("end_color", *color));
         t.extend(surface::appearance(&look.appearance, &Vec3::zeros(), &base));
+        t.extend(self.enabled(id));
         self.out += &t.under("[[particle_system]]");
         for emitter in system.emitters() {
             if let Some(t) = self.emitter(name, emitter) {
@@ -181,15 +199,17 @@ impl Writer<'_> {
         Some(t)
     }
 
-    fn flock(&mut self, name: &str, flock: &Flock) {
-        self.out += &steering(name, flock.steering()).under("[[flock]]");
+    fn flock(&mut self, id: ObjectId, name: &str, flock: &Flock) {
+        let mut t = steering(name, flock.steering());
+        t.extend(self.enabled(id));
+        self.out += &t.under("[[flock]]");
         for &id in flock.boids() {
             let (Some(boid), Some(name)) = (self.world.get::<Boid>(id), self.world.name(id)) else { continue };
-            self.boid(name, boid);
+            self.boid(id, name, boid);
         }
     }
 
-    fn body_flock(&mut self, name: &str, flock: &BodyFlock) {
+    fn body_flock(&mut self, id: ObjectId, name: &str, flock: &BodyFlock) {
         let (mut t, helm) = (steering(name, flock.steering()), flock.helm());
         t.put("agility_per_s", helm.agility);
         t.put("max_angular_acceleration_rad_per_s2", helm.max_angular_acceleration);
@@ -198,10 +218,11 @@ impl Writer<'_> {
         t.put_unless(Vec3::zeros(), "wind_m_per_s", helm.wind);
         let names = flock.bodies().iter().filter_map(|id| self.world.name(*id).map(str::to_owned));
         t.put("bodies", names.collect::<Vec<String>>());
+        t.extend(self.enabled(id));
         self.out += &t.under("[[body_flock]]");
     }
 
-    fn boid(&mut self, name: &str, boid: &Boid) {
+    fn boid(&mut self, id: ObjectId, name: &str, boid: &Boid) {
         let Some(Shape::Sphere { radius }) = boid.collidable().and_then(|body| body.shape(0)) else {
             return self.fault(format!("\"{name}\", a boid that is no sphere"));
         };
@@ -218,10 +239,12 @@ impl Writer<'_> {
         if let Some(visual) = visuals.first() {
             t.extend(surface::appearance(&visual.appearance, &Vec3::zeros(), &AppearanceSpec::default()));
         }
+        t.extend(self.status(id));
         self.out += &t.under("[[flock.group]]");
     }
 
-    fn field(&mut self, mut t: Table, targets: &Targets) {
+    fn field(&mut self, id: ObjectId, mut t: Table, targets: &Targets) {
+        t.extend(self.enabled(id));
         if let Targets::Only(ids) = targets {
             let names = ids.iter().filter_map(|id| self.world.name(*id).map(str::to_owned));
             t.put("targets", names.collect::<Vec<String>>());
@@ -229,8 +252,9 @@ impl Writer<'_> {
         self.out += &t.under("[[field]]");
     }
 
-    fn panels(&mut self, name: &str, panels: &Panels) {
+    fn panels(&mut self, id: ObjectId, name: &str, panels: &Panels) {
         let mut t = field(name, "panels");
+        t.extend(self.enabled(id));
         t.put("density_kg_per_m3", panels.density());
         t.put_unless(Vec3::zeros(), "wind_m_per_s", panels.wind());
         self.out += &t.under("[[field]]");

@@ -8,6 +8,7 @@ use super::shapes::is_same;
 use super::surface;
 use super::text::Table;
 use crate::parse::appearance::AppearanceSpec;
+use crate::parse::body::MODES;
 
 impl Writer<'_> {
     /// Writes a rigid body.
@@ -18,21 +19,13 @@ impl Writer<'_> {
             return;
         };
         let mut t = Table::of("name", name);
-        t.put_unless(
-            "dynamic",
-            "mode",
-            match status.mode {
-                Mode::Dynamic => "dynamic",
-                Mode::Static => "static",
-                Mode::Kinematic => "kinematic",
-            },
-        );
+        t.put_unless("dynamic", "mode", mode(status.mode));
         t.put_pose(&body.frame_of(&part.pose));
         if status.mode != Mode::Static {
             t.put_unless(Vec3::zeros(), "velocity_m_per_s", center.velocity);
             t.put_unless(Vec3::zeros(), "angular_velocity_rad_per_s", center.angular_velocity);
         }
-        t.put_unless(true, "collides", status.collidable);
+        t.put_unless(true, "collidable", status.collidable);
         t.put_unless(true, "enabled", status.enabled);
         t.extend(self.constants(name, body));
         self.out += &t.under("[[body]]");
@@ -134,6 +127,11 @@ impl Writer<'_> {
             self.fault(format!("\"{name}\": its shader '{shader}' is no pattern of scene files"));
         }
     }
+}
+
+/// Returns the word for a mode.
+pub(super) fn mode(mode: Mode) -> &'static str {
+    MODES.iter().find(|(_, known)| *known == mode).map_or("", |(word, _)| *word)
 }
 
 fn is_own_shape(visual: &Visual, body: &RigidBody) -> bool {

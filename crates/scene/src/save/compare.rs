@@ -12,7 +12,9 @@ const ROUNDING: f64 = 1e-9;
 /// Magnitude below which a number counts as zero: rounding of sums of larger ones.
 const ZERO: f64 = 1e-12;
 /// Values of time 0, and values without effect on motion, which the writer notes itself.
-const SKIPPED: [&str; 7] = ["initial_pose", "initial_velocity", "start", "visuals", "cameras", "lights", "properties"];
+/// `original` is the target of a drive before an event set it: the text has the present one.
+const SKIPPED: [&str; 8] =
+    ["initial_pose", "initial_velocity", "start", "visuals", "cameras", "lights", "properties", "original"];
 
 /// Returns where the constants of two worlds differ by more than rounding, in words.
 pub(super) fn differences(ours: &World, read: &World) -> Result<Vec<String>, String> {
@@ -49,14 +51,18 @@ fn spawned(world: &Value) -> BTreeSet<u64> {
     bodies.flatten().filter_map(Value::as_u64).collect()
 }
 
-/// Returns a record with the numbers of a behavior instead of its bytes.
+/// Returns a record without its name, with the numbers of a behavior instead of its bytes.
 fn opened(record: &Value) -> Result<Value, String> {
-    let Some(bytes) = record["Other"]["bytes"].as_array() else { return Ok(record.clone()) };
+    let mut record = record.clone();
+    // the name of the object in its world counts, which the world makes for an object without one
+    record.as_object_mut().into_iter().flat_map(Map::values_mut).for_each(|kind| {
+        kind.as_object_mut().map(|constants| constants.remove("name"));
+    });
+    let Some(bytes) = record["Other"]["bytes"].as_array() else { return Ok(record) };
     let bytes: Vec<u8> = bytes.iter().filter_map(|byte| byte.as_u64()?.try_into().ok()).collect();
     let numbers = tumble_behaviors::serialize_record(&bytes, serde_json::value::Serializer);
-    let mut opened = record.clone();
-    opened["Other"]["bytes"] = numbers.map_err(|e| e.to_string())?;
-    Ok(opened)
+    record["Other"]["bytes"] = numbers.map_err(|e| e.to_string())?;
+    Ok(record)
 }
 
 /// Returns the pairs with the part of a rigid body as the body.

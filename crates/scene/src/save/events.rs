@@ -1,6 +1,6 @@
 //! `[[template]]`, `[[event]]` and `[[sensor]]`.
 
-use tumble_core::collide::{Shape, Vec3};
+use tumble_core::collide::Vec3;
 use tumble_core::{
     Action, Anchor, ArticulatedBody, CameraChange, Ends, ObjectId, RigidBody, ScriptedEvent, Sensor, SensorPlace,
     Smoothness, Subject, Template, Trigger,
@@ -21,7 +21,7 @@ impl Writer<'_> {
     }
 
     /// Writes a template by its first body.
-    pub(super) fn template(&mut self, name: &str, template: &Template) {
+    pub(super) fn template(&mut self, name: &str, template: &Template, enabled: bool) {
         let bodies = template.bodies();
         let Some(body) = bodies.first().and_then(|id| self.world.get::<RigidBody>(*id)) else {
             return self.fault(format!("\"{name}\", a template whose bodies were removed"));
@@ -29,13 +29,16 @@ impl Writer<'_> {
         let mut t = Table::of("name", name);
         t.put("max", bodies.len() as u32);
         t.put_unless(false, "reuse", template.reuses());
+        if !enabled {
+            self.fault(format!("\"{name}\", a template that is disabled, which has no effect; enable it"));
+        }
         t.put_pose(&body.initial_pose);
         t.extend(self.constants(name, body));
         self.out += &t.under("[[template]]");
     }
 
     /// Writes an event.
-    pub(super) fn event(&mut self, name: &str, event: &ScriptedEvent) {
+    pub(super) fn event(&mut self, name: &str, event: &ScriptedEvent, enabled: bool) {
         let mut t = Table::of("name", name);
         let Some(when) = self.trigger(event.trigger()) else {
             return self.fault(format!("\"{name}\", an event of an object that was removed"));
@@ -48,6 +51,7 @@ impl Writer<'_> {
         }
         t.put_unless(0.0, "delay_s", event.delay());
         t.put_unless(u32::MAX, "times", event.times());
+        t.put_unless(true, "enabled", enabled);
         self.out += &t.under("[[event]]");
     }
 
@@ -177,7 +181,7 @@ impl Writer<'_> {
     }
 
     /// Writes a measuring sensor.
-    pub(super) fn sensor(&mut self, name: &str, sensor: &Sensor) {
+    pub(super) fn sensor(&mut self, name: &str, sensor: &Sensor, enabled: bool) {
         let kind = sensor.kind();
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
@@ -198,10 +202,8 @@ impl Writer<'_> {
         if let Some(reference) = sensor.reference() {
             self.site(reference).0.iter().for_each(|part| t.put("relative_to", part));
         }
-        match sensor.volume() {
-            Some(Shape::Mesh(_)) => self.fault(format!("\"{name}\", a sensor whose volume is a mesh")),
-            Some(volume) => t.put("volume", self.meshes.shape(volume)),
-            None => {}
+        if let Some(volume) = sensor.volume() {
+            t.put("volume", self.meshes.shape(volume));
         }
         t.put_unless(f64::INFINITY, "cutoff", sensor.cutoff());
         if sensor.kind().is_camera() {
@@ -213,10 +215,8 @@ impl Writer<'_> {
         t.put_unless(0.0, "bias_walk", noise.bias_walk);
         t.put_unless(0.0, "quantization", noise.quantization);
         t.put_unless(0, "delay", noise.delay);
-        match u32::try_from(noise.seed) {
-            Ok(seed) => t.put_unless(0, "seed", seed),
-            Err(_) => self.fault(format!("\"{name}\": its seed {}, above 32 bits", noise.seed)),
-        }
+        t.put_unless(0, "seed", noise.seed);
+        t.put_unless(true, "enabled", enabled);
         self.out += &t.under("[[sensor]]");
     }
 

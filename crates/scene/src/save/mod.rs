@@ -242,23 +242,18 @@ impl Writer<'_> {
         let any: &dyn std::any::Any = object;
         let enabled = self.world.status(id).is_none_or(|status| status.enabled);
         if let Some(template) = any.downcast_ref::<Template>() {
-            self.template(name, template);
+            self.template(name, template, enabled);
         } else if let Some(event) = any.downcast_ref::<ScriptedEvent>() {
-            self.event(name, event);
+            self.event(name, event, enabled);
         } else if let Some(sensor) = any.downcast_ref::<Sensor>() {
-            self.sensor(name, sensor);
-        } else if any.is::<RigidBody>()
+            self.sensor(name, sensor, enabled);
+        } else if !(any.is::<RigidBody>()
             || any.is::<ArticulatedBody>()
             || any.is::<LoopJoint>()
             || any.is::<Mimic>()
-            || self.behavior(id, name)
+            || self.behavior(id, name))
         {
-            return;
-        } else {
-            return self.fault(format!("\"{name}\", an object of a type of its own"));
-        }
-        if !enabled {
-            self.fault(format!("\"{name}\", which is disabled"));
+            self.fault(format!("\"{name}\", an object of a type of its own"));
         }
     }
 

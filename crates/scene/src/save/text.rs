@@ -33,6 +33,12 @@ impl Toml for u32 {
     }
 }
 
+impl Toml for u64 {
+    fn toml(&self) -> String {
+        self.to_string()
+    }
+}
+
 impl Toml for i32 {
     fn toml(&self) -> String {
         self.to_string()

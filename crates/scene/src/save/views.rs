@@ -11,7 +11,7 @@ use crate::parse::view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec
 use crate::parse::world::{Integrator, Solver, Stepper, WorldSettings};
 
 impl Writer<'_> {
-    /// Writes `[world]`. Settings that scene files do not have are found when the file is read back.
+    /// Writes `[world]`.
     pub(super) fn world_table(&mut self) {
         let (s, absent): (&Settings, _) = (self.world.settings(), WorldSettings::default());
         let mut t = Table::of("gravity_m_per_s2", s.gravity);
@@ -35,6 +35,16 @@ impl Writer<'_> {
         t.put_unless(rule(absent.combine_friction), "combine_friction", rule(s.combine_friction));
         t.put_unless(absent.event_impulse_n_s, "event_impulse_n_s", s.event_impulse);
         t.put_unless(absent.max_turn_rad, "max_turn_rad", s.max_turn);
+        t.put_unless(
+            Settings::default().drift_tolerance.max(s.contact_tolerance),
+            "drift_tolerance_m",
+            s.drift_tolerance,
+        );
+        t.put_unless(absent.recovery_speed_m_per_s, "recovery_speed_m_per_s", s.recovery_speed);
+        t.put_unless(absent.projection_sweeps, "projection_sweeps", s.projection_sweeps);
+        t.put_unless(absent.stabilize_positions, "stabilize_positions", s.stabilize_positions);
+        t.put_unless(absent.solver_tolerance_m_per_s, "solver_tolerance_m_per_s", s.solver_settings.tolerance);
+        t.put_unless(absent.max_relaxations, "max_relaxations", s.solver_settings.max_relaxations);
         t.put_unless(absent.threads, "threads", s.threads);
         debug_assert_eq!(absent.contacts, ContactMode::Surface, "bodies are written with this default");
         self.out += &t.under("[world]");

@@ -41,9 +41,9 @@ impl<'a, 'd> LinkElement<'a, 'd> {
         let mass = read_inertial(&element, &name, frames, context);
         let mut link = LinkElement { name, element, pose, mass, shapes: Vec::new(), planes: Vec::new() };
         check_names(element.children("collision"), "a link");
-        for (tag, collides) in [("collision", true), ("visual", false)] {
+        for (tag, collidable) in [("collision", true), ("visual", false)] {
             for part in element.children(tag) {
-                link.read_shape(part, collides, frames, context);
+                link.read_shape(part, collidable, frames, context);
             }
         }
         if !link.shapes.iter().any(|shape| shape.visible) {
@@ -55,20 +55,22 @@ impl<'a, 'd> LinkElement<'a, 'd> {
     fn read_shape(
         &mut self,
         part: Element<'a, 'd>,
-        collides: bool,
+        collidable: bool,
         frames: &mut Frames<'a, 'd>,
         context: &mut Context<'_>,
     ) {
-        let read: &[&str] = if collides { &["pose", "geometry", "surface"] } else { &["pose", "geometry", "material"] };
+        let read: &[&str] =
+            if collidable { &["pose", "geometry", "surface"] } else { &["pose", "geometry", "material"] };
         note_others(&part, read, &mut context.notes);
         let mut pose = frames.pose_in(&part, &self.name);
         let Some(geometry) = part.required("geometry", "<geometry> with one shape") else { return };
-        let Some((geometry, turned)) = read_geometry(&geometry, collides, context) else { return };
+        let Some((geometry, turned)) = read_geometry(&geometry, collidable, context) else { return };
         pose *= turned;
         let surface = read_surface(&part, context);
-        let name = shape_name(&part).filter(|_| collides);
-        let visible = !collides;
-        let shape = LinkShape { pose, geometry, mass: None, surface, collides, visible, name, one_way: None };
+        let name = shape_name(&part).filter(|_| collidable);
+        let visible = !collidable;
+        let (one_way, sensor) = (None, false);
+        let shape = LinkShape { pose, geometry, mass: None, surface, collidable, visible, name, one_way, sensor };
         if shape.geometry == Geometry::Shape(ShapeSpec::HalfSpace) {
             self.planes.push((part, shape));
         } else {
@@ -114,7 +116,7 @@ fn read_inertial<'a, 'd>(
 }
 
 /// Reads the shape of `<geometry>`, and its pose in the frame of the element. `None` if it is left out or wrong.
-fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<(Geometry, Pose)> {
+fn read_geometry(geometry: &Element<'_, '_>, collidable: bool, context: &mut Context<'_>) -> Option<(Geometry, Pose)> {
     let expected = "expected <box>, <sphere>, <cylinder>, <capsule>, <cone>, <ellipsoid>, <plane> or <mesh>";
     let Some(form) = geometry.first() else {
         geometry.problem("is empty", expected);
@@ -130,7 +132,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
         "cylinder" => ShapeSpec::Cylinder { radius_m: length(&form, "radius"), length_m: length(&form, "length") },
         "capsule" => ShapeSpec::Capsule { radius_m: length(&form, "radius"), length_m: length(&form, "length") },
         "ellipsoid" => ShapeSpec::Ellipsoid { size_m: three("radii", "x y z")?.map(|r| 2.0 * r) },
-        "plane" if !collides => {
+        "plane" if !collidable => {
             note(&form, "planes that are only drawn are left out", &mut context.notes);
             return None;
         }
@@ -148,7 +150,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
                 return None;
             }
             note_others(&form, &["uri", "scale"], &mut context.notes);
-            let geometry = mesh_file(&form, (super::value::text(&uri), scale), collides, context)?;
+            let geometry = mesh_file(&form, (super::value::text(&uri), scale), collidable, context)?;
             return Some((geometry, Pose::identity()));
         }
         "cone" => {

@@ -125,18 +125,28 @@ fn read_shapes(link: &Element<'_, '_>, context: &mut Context<'_>) -> Vec<LinkSha
 }
 
 /// Reads a `<visual>` or `<collision>`; `None` if it is left out or wrong.
-pub(super) fn read_shape(element: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<LinkShape> {
+pub(super) fn read_shape(element: &Element<'_, '_>, collidable: bool, context: &mut Context<'_>) -> Option<LinkShape> {
     let pose = read_origin(element);
     let geometry = element.required("geometry", "<geometry> with a box, cylinder, sphere, capsule or mesh")?;
-    let geometry = read_geometry(&geometry, collides, context)?;
+    let geometry = read_geometry(&geometry, collidable, context)?;
     let mut surface = context.options.surface.clone();
     if !context.options.recolor
         && let Some(color) = material_color(element, context)
     {
         surface.appearance.color = color;
     }
-    let name = shape_name(element).filter(|_| collides);
-    Some(LinkShape { pose, geometry, mass: None, surface, collides, visible: !collides, name, one_way: None })
+    let name = shape_name(element).filter(|_| collidable);
+    Some(LinkShape {
+        pose,
+        geometry,
+        mass: None,
+        surface,
+        collidable,
+        visible: !collidable,
+        name,
+        one_way: None,
+        sensor: false,
+    })
 }
 
 fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Color> {
@@ -144,7 +154,7 @@ fn material_color(element: &Element<'_, '_>, context: &Context<'_>) -> Option<Co
     read_color(&material).or_else(|| context.colors.get(material.text("name")?).copied())
 }
 
-fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
+fn read_geometry(geometry: &Element<'_, '_>, collidable: bool, context: &mut Context<'_>) -> Option<Geometry> {
     let expected = "expected <box>, <cylinder>, <sphere>, <capsule> or <mesh>";
     let Some(form) = geometry.first() else {
         geometry.problem("is empty", expected);
@@ -159,7 +169,7 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
         "cylinder" => ShapeSpec::Cylinder { radius_m: length("radius"), length_m: length("length") },
         "sphere" => ShapeSpec::Sphere { radius_m: length("radius") },
         "capsule" => ShapeSpec::Capsule { radius_m: length("radius"), length_m: length("length") },
-        "mesh" => return read_mesh(&form, collides, context),
+        "mesh" => return read_mesh(&form, collidable, context),
         other => {
             form.problem(format_args!("(<{other}>) is not a shape"), expected);
             return None;
@@ -167,21 +177,21 @@ fn read_geometry(geometry: &Element<'_, '_>, collides: bool, context: &mut Conte
     }))
 }
 
-fn read_mesh(mesh: &Element<'_, '_>, collides: bool, context: &mut Context<'_>) -> Option<Geometry> {
+fn read_mesh(mesh: &Element<'_, '_>, collidable: bool, context: &mut Context<'_>) -> Option<Geometry> {
     let uri = mesh.required_text("filename", "the path of an .stl, .obj, .ply or .dae file")?;
     let scale: [f64; 3] = mesh.numbers("scale", Bound::ANY).unwrap_or([1.0; 3]);
     if scale.contains(&0.0) {
         mesh.wrong("scale", "three numbers other than 0");
         return None;
     }
-    mesh_file(mesh, (uri, scale), collides, context)
+    mesh_file(mesh, (uri, scale), collidable, context)
 }
 
 /// Returns the geometry of a mesh file that an element names, scaled; `None` if it is left out, with a note or a problem.
 pub(crate) fn mesh_file(
     mesh: &Element<'_, '_>,
     (uri, scale): (&str, [f64; 3]),
-    collides: bool,
+    collidable: bool,
     context: &mut Context<'_>,
 ) -> Option<Geometry> {
     let place = format!("{}:{}", context.file, mesh.log.line(mesh.span().start));
@@ -189,17 +199,17 @@ pub(crate) fn mesh_file(
     let required = context.options.missing_meshes == MissingMeshes::Error;
     let why = match find(uri, context.folder, context.options) {
         Found::Here(path) => return Some(Geometry::File { path, scale, place, hull, required }),
-        Found::Missing(path) if collides && required => format!("there is no file {path}"),
+        Found::Missing(path) if collidable && required => format!("there is no file {path}"),
         Found::Missing(_) => "there is no such file".into(),
         Found::Format(format) => {
             format!("the format '{format}' is not supported; supported are .stl, .obj, .ply and .dae")
         }
     };
-    if collides && required {
+    if collidable && required {
         let expected = "expected an existing mesh; `packages` (--package NAME=DIR) sets folders of packages, missing_meshes = \"skip\" (--missing-meshes skip) leaves the mesh out";
         mesh.problem(format_args!("\"{uri}\" cannot be used for collision: {why}"), expected);
     } else {
-        let kind = if collides { "collision" } else { "visual" };
+        let kind = if collidable { "collision" } else { "visual" };
         context.notes.add(format!("{place}: {kind} mesh {uri}"), format!("left out: {why}"));
     }
     None

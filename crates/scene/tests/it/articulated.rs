@@ -66,7 +66,7 @@ fn the_example_of_every_key_means_what_it_says() {
     let mimic = link("wheel").joint.mimic.unwrap();
     assert_eq!((Some(mimic.link), mimic.multiplier), (crane.link("trolley"), 20.0));
     assert!((mimic.offset - 0.17453292519943295).abs() < 1e-16);
-    assert!(!link("wheel").shapes[0].collides);
+    assert!(!link("wheel").shapes[0].collidable);
 
     let Drive::Playback { motion, limit } = &link("lamp").joint.dof.drive else { panic!("a playback") };
     assert_eq!(*limit, 20.0);
@@ -140,7 +140,7 @@ fn wrong_joints_are_reported() {
     assert_errors(
         &link_with("limits_deg = [30, -30]"),
         &[
-            "s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; expected [lower, upper], the lower first; or false for none",
+            "s.toml:7:14: `limits_deg` of link \"l\" is [30, -30]; expected [lower, upper], the lower first, -inf and inf for none on a side; or false for none",
         ],
     );
     assert_errors(
@@ -184,9 +184,9 @@ fn wrong_joints_are_reported() {
 #[test]
 fn wrong_masses_are_reported() {
     assert_errors(
-        &link_with("shape = { type = \"sphere\", radius_m = 1 }"),
+        &link_with("shape = { type = \"sphere\", radius_m = 1, mass_kg = 1 }\nmass_kg = 1"),
         &[
-            "s.toml:3:1: link \"l\" has no `mass_kg`; expected `mass_kg` or `density_kg_per_m3` for the link, or for each of its shapes",
+            "s.toml:3:1: link \"l\" has a mass, and its shapes have masses; expected the mass of the link, or that of each shape",
         ],
     );
     assert_errors(
@@ -201,7 +201,7 @@ fn wrong_masses_are_reported() {
     );
     assert_errors(
         &link_with("mass_kg = nan"),
-        &["s.toml:7:11: `mass_kg` of link \"l\" is nan; expected a number greater than 0 (from 1e-9 to 1e12)"],
+        &["s.toml:7:11: `mass_kg` of link \"l\" is nan; expected a number of at least 0"],
     );
     assert_errors(
         &link_with("mass_kg = 1\nshape = { type = \"half_space\" }"),

@@ -32,7 +32,7 @@ fn wrong_events_are_refused_with_line_and_column() {
         ),
         (
             format!("when = {{ enters = \"floor\" }}\n{spawn}"),
-            "s.toml:12:19: `enters` of `when` of event \"e\" is \"floor\"; expected the name of a body with `sensor = true`",
+            "s.toml:12:19: `enters` of `when` of event \"e\" is \"floor\"; expected the name of a body, or of an articulated body with a shape, that has `sensor = true`",
         ),
         (
             format!("when = {{ after = \"e\" }}\n{spawn}"),

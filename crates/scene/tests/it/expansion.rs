@@ -174,7 +174,7 @@ fn contact_constants_come_from_the_material_and_the_body() {
 fn a_body_with_every_key() {
     let it = body(
         "mode = \"kinematic\"\nposition_m = [1, 2, 3]\nvelocity_m_per_s = [4, 5, 6]\nangular_velocity_rad_per_s = [7, 8, 9]\n\
-         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollides = false\nenabled = false\nvisible = false\nclearcoat = 1\nglow = true\nmetallic = 0.5\n\
+         linear_damping_per_s = 0.1\nangular_damping_per_s = 0.2\ncollidable = false\nenabled = false\nvisible = false\nclearcoat = 1\nglow = true\nmetallic = 0.5\n\
          group = 5\nmask = [0, 63]\nsensor = true\ncenter_m = [0, 0, 0.5]\n\
          inertia_kg_m2 = [1, 2, 2.5, 0, 0, 0.1]\ngravity_scale = -0.5\nlocked = [\"x\", \"rotation_z\"]",
     );
@@ -182,7 +182,7 @@ fn a_body_with_every_key() {
     assert_eq!((it.position_m, it.velocity_m_per_s), ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0]));
     assert_eq!(it.angular_velocity_rad_per_s, [7.0, 8.0, 9.0]);
     assert_eq!((it.linear_damping_per_s, it.angular_damping_per_s), (0.1, 0.2));
-    assert!(!it.collides && !it.enabled && !it.visible);
+    assert!(!it.collidable && !it.enabled && !it.visible);
     assert_eq!((it.center_m, it.gravity_scale), (Some([0.0, 0.0, 0.5]), -0.5));
     let inertia = it.inertia_kg_m2.unwrap();
     assert_eq!((inertia.m11, inertia.m22, inertia.m33, inertia.m23, inertia.m12), (1.0, 2.0, 2.5, 0.1, 0.0));

@@ -13,7 +13,7 @@ name = "drum"
 shape = { type = "cylinder", radius_m = 0.1, length_m = 0.1 }
 mass_kg = 4.0
 position_m = [1, 0, 2]
-collides = false
+collidable = false
 color = [0.9, 0.4, 0.1]
 
 [[articulated]]
@@ -115,7 +115,7 @@ fn a_scene_with_a_coupling_and_a_cone_is_read_and_saved() {
 /// A drum that collides has its color in the image.
 #[test]
 fn a_color_camera_of_a_scene_sees_the_color_of_a_body() {
-    let world = built(&SCENE.replace("collides = false\n", ""));
+    let world = built(&SCENE.replace("collidable = false\n", ""));
     let eye = world.find("eye").unwrap();
     assert_eq!(world.get::<tumble_core::Sensor>(eye).unwrap().kind(), SensorKind::Color);
     let pixel = world.color_image(eye).unwrap().pixels[12 * 32 + 16];

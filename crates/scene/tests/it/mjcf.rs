@@ -116,7 +116,7 @@ fn bodies_become_static_rigid_kinematic_and_articulated_ones() {
         .filter_map(|b| b.mass)
         .map(|mass| match mass {
             tumble_scene::MassSpec::Mass(kg) => kg,
-            tumble_scene::MassSpec::Density(_) => panic!(),
+            _ => panic!(),
         })
         .sum();
     let links: f64 = scene

@@ -193,7 +193,7 @@ fn merge_environment(scene: &mut SceneFile, from: SceneFile, notes: &mut Vec<Str
                 from.file, body.name, scene.file
             )));
         }
-        body.collides = false;
+        body.collidable = false;
         body.material = body.material.map(|m| m + materials);
         body.shape.shift_meshes(meshes);
         scene.bodies.push(body);

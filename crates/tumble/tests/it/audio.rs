@@ -22,14 +22,14 @@ position_m = [0, 0, 0.4]
 [[body]]
 name = "left"
 mode = "static"
-collides = false
+collidable = false
 shape = { type = "sphere", radius_m = 0.1 }
 position_m = [-3, 0, 0.5]
 camera = { forward = [0, 1, 0] }
 [[body]]
 name = "right"
 mode = "static"
-collides = false
+collidable = false
 shape = { type = "sphere", radius_m = 0.1 }
 position_m = [3, 0, 0.5]
 camera = { forward = [0, 1, 0] }

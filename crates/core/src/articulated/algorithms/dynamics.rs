@@ -70,9 +70,9 @@ impl Dynamics {
         }
     }
 
-    /// Takes the armatures of the model, from the next [`refresh`](Self::refresh) on.
-    pub(in crate::articulated) fn set_armatures(&mut self, model: &Model) {
-        self.compiled.set_armatures(model);
+    /// Takes masses and armatures of the model, from the next [`refresh`](Self::refresh) on.
+    pub(in crate::articulated) fn set_inertias(&mut self, model: &Model) {
+        self.compiled.set_inertias(model);
     }
 
     /// Returns the number of moving links.

@@ -50,13 +50,9 @@ impl FreeMotion {
         }
     }
 
-    /// Takes the armatures of the model.
-    pub fn set_armatures(&mut self, model: &Model) {
-        self.dynamics.set_armatures(model);
-    }
-
     /// Advances `x = [q, v]` by `h` seconds of free motion.
     pub fn advance(&mut self, model: &Model, x: &mut [f64], h: f64) {
+        self.dynamics.set_inertias(model); // they may have changed since the last call
         let n = model.positions();
         if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
             return;
@@ -111,6 +107,7 @@ impl FreeMotion {
     /// Kinetic energy is conserved, by a final scaling to rounding. So is linear momentum, which is
     /// the product of `v` with a parallel field.
     pub fn transport(&mut self, model: &Model, x: &mut [f64], d: &[f64], h: f64) {
+        self.dynamics.set_inertias(model);
         let n = model.positions();
         let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
         let stretch = size(&x[n..]) / size(d);

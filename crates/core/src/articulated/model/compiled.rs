@@ -15,7 +15,7 @@
 //! no gyroscopic torque.
 
 use crate::articulated::model::joint::Joint;
-use crate::articulated::model::{Link, LinkMass, Model};
+use crate::articulated::model::{Inertias, Link, LinkMass, Model};
 use crate::spatial::{Matrix, Vector};
 use nalgebra::SymmetricEigen;
 use tumble_collide::{Mat3, Vec3};
@@ -66,13 +66,21 @@ pub(in crate::articulated) struct Compiled {
     pub blocks: usize,
     pub positions: usize,
     pub dof: usize,
+    /// The inertias of the model that it has.
+    inertias: Inertias,
 }
 
 impl Compiled {
-    /// Takes the armatures of the model, which may change between steps.
-    pub fn set_armatures(&mut self, model: &Model) {
+    /// Takes masses and armatures of the model, which may change between steps.
+    pub fn set_inertias(&mut self, model: &Model) {
+        if self.inertias.are(&model.inertias) {
+            return;
+        }
+        self.inertias = model.inertias.clone();
         for (body, link) in self.bodies.iter_mut().zip(model.links()) {
-            body.armature = link.armature;
+            (body.mass, body.armature) = (link.mass.mass, link.armature);
+            body.moment = moment(&link.mass, &body.own);
+            (body.sphere, body.pair) = biaxial(&link.mass, &body.own);
         }
     }
 
@@ -82,6 +90,7 @@ impl Compiled {
             blocks: 0,
             positions: model.positions(),
             dof: model.dof(),
+            inertias: model.inertias.clone(),
         };
         for link in model.links() {
             let outer = link.parent.map_or(Mat3::identity(), |p| compiled.bodies[p].own);
@@ -122,10 +131,15 @@ fn body(link: &Link, kind: JointKind, outer: &Mat3) -> CompiledLink {
         own,
         mass: link.mass.mass,
         armature: link.armature,
-        moment: (link.mass.mass * (own.transpose() * link.mass.center)).into(),
+        moment: moment(&link.mass, &own),
         sphere,
         pair,
     }
+}
+
+/// Returns the first moment of mass, kg·m, in axes `own`.
+fn moment(mass: &LinkMass, own: &Mat3) -> Vector<f64> {
+    (mass.mass * (own.transpose() * mass.center)).into()
 }
 
 /// Returns right-handed unit axes with the third along `axis`; exact for coordinate axes.

@@ -13,6 +13,7 @@ pub(in crate::articulated) mod playback;
 use self::joint::Joint;
 use nalgebra::SymmetricEigen;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use tumble_collide::{Mat3, Pose, Vec3};
 
 /// Maximum number of links of a model, as a bound for input from files.
@@ -180,6 +181,26 @@ pub struct LinkFrame {
     pub link: Option<usize>,
     /// Pose in that link's frame, or in the base frame.
     pub pose: Pose,
+    /// Mass properties of the link alone, its own frame: without those of fixed links.
+    pub mass: LinkMass,
+}
+
+/// Tells whether the inertias of two models are the same ones: each change makes another one.
+#[derive(Clone, Debug, Default)]
+pub(in crate::articulated) struct Inertias(Arc<()>);
+
+impl Inertias {
+    /// Returns whether nothing was changed between the two.
+    pub fn are(&self, others: &Inertias) -> bool {
+        Arc::ptr_eq(&self.0, &others.0)
+    }
+}
+
+impl PartialEq for Inertias {
+    /// The numbers are compared, not how they came about.
+    fn eq(&self, _: &Inertias) -> bool {
+        true
+    }
 }
 
 /// A tree of links with its coordinates.
@@ -189,6 +210,8 @@ pub struct Model {
     frames: Vec<LinkFrame>,
     positions: usize,
     dof: usize,
+    #[serde(skip)]
+    inertias: Inertias,
 }
 
 impl Model {
@@ -310,7 +333,8 @@ impl ModelBuilder {
         if self.added.len() > MAX_LINKS {
             return Err(ModelError::TooMany);
         }
-        let mut model = Model { links: Vec::new(), frames: Vec::new(), positions: 0, dof: 0 };
+        let mut model =
+            Model { links: Vec::new(), frames: Vec::new(), positions: 0, dof: 0, inertias: Inertias::default() };
         let mut names = BTreeMap::new();
         for (number, added) in self.added.into_iter().enumerate() {
             if names.insert(added.name.clone(), number).is_some() {
@@ -336,7 +360,30 @@ impl Model {
         let own = &mut self.links[link];
         check_armature(&own.name, &own.joint, armature)?;
         let before = std::mem::replace(&mut own.armature, armature);
+        self.inertias = Inertias::default();
         self.check_masses().inspect_err(|_| self.links[link].armature = before)
+    }
+
+    /// Sets the mass properties of a link alone, by the number of its frame; those of links that are fixed to it stay.
+    ///
+    /// # Errors
+    /// [`ModelError`] if they are out of their range, or a joint then moves no inertia. Nothing is changed then.
+    pub(crate) fn set_mass(&mut self, frame: usize, mass: LinkMass) -> Result<(), ModelError> {
+        mass.validate(&self.frames[frame].name)?;
+        let before = std::mem::replace(&mut self.frames[frame].mass, mass);
+        let Some(link) = self.frames[frame].link else { return Ok(()) };
+        let folded = std::mem::replace(&mut self.links[link].mass, LinkMass::none());
+        self.links[link].mass = self.folded_mass(link);
+        self.inertias = Inertias::default();
+        self.check_masses().inspect_err(|_| (self.links[link].mass, self.frames[frame].mass) = (folded, before))
+    }
+
+    /// Returns the mass properties of a moving link with those of all links that are fixed to it, in the order in which they
+    /// were added.
+    fn folded_mass(&self, link: usize) -> LinkMass {
+        let mut frames = self.frames.iter().filter(|frame| frame.link == Some(link));
+        let own = frames.next().map_or_else(LinkMass::none, |frame| frame.mass);
+        frames.fold(own, |sum, frame| sum.with(&frame.mass.seen_from(&frame.pose)))
     }
 
     fn add(&mut self, number: usize, added: Added) -> Result<(), ModelError> {
@@ -362,11 +409,11 @@ impl Model {
                 let carried = &mut self.links[link].mass;
                 *carried = carried.with(&mass.seen_from(&placement));
             }
-            self.frames.push(LinkFrame { name, link: carrier, pose: placement });
+            self.frames.push(LinkFrame { name, link: carrier, pose: placement, mass });
             return Ok(());
         }
         let joint = unit_axis(joint, &name)?;
-        self.frames.push(LinkFrame { name: name.clone(), link: Some(self.links.len()), pose: Pose::identity() });
+        self.frames.push(LinkFrame { name: name.clone(), link: Some(self.links.len()), pose: Pose::identity(), mass });
         let (q, v) = (self.positions, self.dof);
         self.positions += joint.positions();
         self.dof += joint.dof();
@@ -383,7 +430,9 @@ impl Model {
             let starts = std::mem::replace(&mut ends, (link.q + link.joint.positions(), link.v + link.joint.dof()));
             link.parent.is_none_or(|parent| parent < i) && (link.q, link.v) == starts && link.joint.dof() > 0
         });
-        let frames = self.frames.iter().all(|frame| frame.link.is_none_or(|link| link < self.links.len()));
+        let frames = self.frames.iter().all(|frame| {
+            frame.link.is_none_or(|link| link < self.links.len()) && frame.mass.validate(&frame.name).is_ok()
+        });
         links && armatures && frames && ends == (self.positions, self.dof) && self.check_masses().is_ok()
     }
 

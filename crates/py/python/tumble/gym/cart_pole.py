@@ -28,7 +28,7 @@ roughness = 0.35
 
 [[articulated]]
 name = "cart_pole"
-collides = false
+collidable = false
 
 [[articulated.link]]
 name = "cart"
@@ -55,7 +55,7 @@ mode = "static"
 position_m = [0, 0, -0.16]
 material = "steel"
 shape = { type = "box", size_m = [6, 0.06, 0.06] }
-collides = false
+collidable = false
 
 [ground]
 height_m = -1.0

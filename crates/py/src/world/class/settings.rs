@@ -1,11 +1,12 @@
 //! Settings of a world, and its clock.
 
 use crate::arrays::convert::{vec3, vector, whole_number};
-use crate::errors::Result;
+use crate::errors::{Error, Result};
 use crate::world::class::World;
 use crate::world::pairs::combine;
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use tumble::dynamics::Sleep;
 
 #[pymethods]
 impl World {
@@ -136,5 +137,141 @@ impl World {
     #[setter]
     fn set_max_turn(&self, py: Python<'_>, value: f64) -> Result<()> {
         self.set(py, |s| s.max_turn = value)
+    }
+
+    /// Sub-steps of each step.
+    #[getter]
+    fn substeps(&self) -> Result<u32> {
+        self.settings(|s| s.substeps)
+    }
+
+    #[setter]
+    fn set_substeps(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+        self.set(py, |s| s.substeps = value)
+    }
+
+    /// Largest number of solver sweeps.
+    #[getter]
+    fn iterations(&self) -> Result<u32> {
+        self.settings(|s| s.solver_settings.max_sweeps)
+    }
+
+    #[setter]
+    fn set_iterations(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+        self.set(py, |s| s.solver_settings.max_sweeps = value)
+    }
+
+    /// Largest number of block relaxations of a step in sweeps beyond the first 25.
+    #[getter]
+    fn max_relaxations(&self) -> Result<u32> {
+        self.settings(|s| s.solver_settings.max_relaxations)
+    }
+
+    #[setter]
+    fn set_max_relaxations(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+        self.set(py, |s| s.solver_settings.max_relaxations = value)
+    }
+
+    /// A sweep that changes no velocity by more than this ends a solve, m/s.
+    #[getter]
+    fn solver_tolerance(&self) -> Result<f64> {
+        self.settings(|s| s.solver_settings.tolerance)
+    }
+
+    #[setter]
+    fn set_solver_tolerance(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.solver_settings.tolerance = value)
+    }
+
+    /// Largest number of sweeps of the correction of overlap.
+    #[getter]
+    fn projection_sweeps(&self) -> Result<u32> {
+        self.settings(|s| s.projection_sweeps)
+    }
+
+    #[setter]
+    fn set_projection_sweeps(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+        self.set(py, |s| s.projection_sweeps = value)
+    }
+
+    /// Whether positions of joints are corrected, and not their velocities alone.
+    #[getter]
+    fn stabilize_positions(&self) -> Result<bool> {
+        self.settings(|s| s.stabilize_positions)
+    }
+
+    #[setter]
+    fn set_stabilize_positions(&self, py: Python<'_>, value: bool) -> Result<()> {
+        self.set(py, |s| s.stabilize_positions = value)
+    }
+
+    /// Surfaces closer than this are in contact in ``"backtracking"``, m.
+    #[getter]
+    fn contact_tolerance(&self) -> Result<f64> {
+        self.settings(|s| s.contact_tolerance)
+    }
+
+    #[setter]
+    fn set_contact_tolerance(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.contact_tolerance = value)
+    }
+
+    /// Depth that a lasting contact may reach within a sub-step, m, at least ``contact_tolerance``.
+    #[getter]
+    fn drift_tolerance(&self) -> Result<f64> {
+        self.settings(|s| s.drift_tolerance)
+    }
+
+    #[setter]
+    fn set_drift_tolerance(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.drift_tolerance = value)
+    }
+
+    /// Largest speed at which overlap and open joints are corrected, m/s.
+    #[getter]
+    fn recovery_speed(&self) -> Result<f64> {
+        self.settings(|s| s.recovery_speed)
+    }
+
+    #[setter]
+    fn set_recovery_speed(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.recovery_speed = value)
+    }
+
+    /// Error of an inner step of ``"dormand_prince"``, m, rad, m/s and rad/s.
+    #[getter]
+    fn integrator_tolerance(&self) -> Result<f64> {
+        self.settings(|s| s.integrator_tolerance)
+    }
+
+    #[setter]
+    fn set_integrator_tolerance(&self, py: Python<'_>, value: f64) -> Result<()> {
+        self.set(py, |s| s.integrator_tolerance = value)
+    }
+
+    /// Seconds after which islands that moved by less than ``sleep_within`` sleep until something touches them; None:
+    /// never.
+    #[getter]
+    fn sleep_after(&self) -> Result<Option<f64>> {
+        self.settings(|s| s.sleep.map(|sleep| sleep.after))
+    }
+
+    #[setter]
+    fn set_sleep_after(&self, py: Python<'_>, value: Option<f64>) -> Result<()> {
+        self.set(py, |s| s.sleep = value.map(|after| Sleep { after, ..s.sleep.unwrap_or_default() }))
+    }
+
+    /// Largest displacement of any point of an island at rest during ``sleep_after``, m. Settable while that is not None.
+    #[getter]
+    fn sleep_within(&self) -> Result<f64> {
+        self.settings(|s| s.sleep.unwrap_or_default().within)
+    }
+
+    #[setter]
+    fn set_sleep_within(&self, py: Python<'_>, value: f64) -> Result<()> {
+        if self.settings(|s| s.sleep.is_none())? {
+            return Err(Error::value("sleep_within: nothing sleeps; set sleep_after first"));
+        }
+        self.set(py, |s| s.sleep = s.sleep.map(|sleep| Sleep { within: value, ..sleep }))
     }
 }

@@ -62,15 +62,15 @@ impl MjcfWriter<'_> {
     }
 
     /// Writes the shape of a body and its other visuals. `pose` is that of the body's frame.
-    fn rigid_geoms(&mut self, name: &str, body: &RigidBody, pose: &Pose, collides: bool, label: Option<&str>) {
+    fn rigid_geoms(&mut self, name: &str, body: &RigidBody, pose: &Pose, collidable: bool, label: Option<&str>) {
         let mut left: Vec<_> = body.renderable().map_or(&[][..], |r| r.visuals()).iter().collect();
         let visual = visual_of(&mut left, body.shape(), &Pose::identity());
         let Some(parts) = body.collidable() else { return };
-        let common = self.surface(name, parts, 0, collides, visual.map(|visual| &visual.appearance));
+        let common = self.surface(name, parts, 0, collidable, visual.map(|visual| &visual.appearance));
         if parts.is_sensor(0) {
             self.note(name, "bodies that only report overlaps do not collide in MuJoCo, and report nothing");
         }
-        self.solid(name, (parts, 0), pose, (collides, label), &common);
+        self.solid(name, (parts, 0), pose, (collidable, label), &common);
         let center = Pose::from_parts(Translation3::from(body.shape().center_of_mass()), nalgebra::one());
         for visual in left.into_iter().filter(|visual| visual.drawn().is_some()) {
             let mut visual = visual.clone();
@@ -106,7 +106,7 @@ impl MjcfWriter<'_> {
         owner: &str,
         (parts, part): (&dyn Collidable, usize),
         pose: &Pose,
-        (collides, label): (bool, Option<&str>),
+        (collidable, label): (bool, Option<&str>),
         common: &Attributes,
     ) {
         let Some(shape) = parts.shape(part) else { return };
@@ -130,7 +130,7 @@ impl MjcfWriter<'_> {
         };
         for (n, piece) in compound.parts().iter().enumerate() {
             let own = parts.shape_materials(part).iter().find(|(shape, _)| *shape == n);
-            let surface = match own.filter(|_| collides && !parts.is_sensor(part)) {
+            let surface = match own.filter(|_| collidable && !parts.is_sensor(part)) {
                 Some((_, material)) => common.without(&["friction", "condim"]).joined(&self.friction(owner, material)),
                 None => common.clone(),
             };

@@ -149,11 +149,11 @@ impl MjcfWriter<'_> {
         owner: &str,
         parts: &dyn Collidable,
         part: usize,
-        collides: bool,
+        collidable: bool,
         look: Option<&Appearance>,
     ) -> Attributes {
         let mut t = Attributes::default();
-        if collides && !parts.is_sensor(part) {
+        if collidable && !parts.is_sensor(part) {
             let [kind, affinity] = self.groups.bits(kind_of(parts, part));
             t.put_unless(1, "contype", kind, kind.to_string());
             t.put_unless(1, "conaffinity", affinity, affinity.to_string());

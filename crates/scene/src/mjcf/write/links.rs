@@ -37,7 +37,7 @@ struct Tree<'b> {
     body: &'b ArticulatedBody,
     state: &'b [f64],
     /// Whether the whole body collides.
-    collides: bool,
+    collidable: bool,
     children: Vec<Vec<usize>>,
     /// Names of its joints by link.
     joints: Vec<String>,
@@ -71,7 +71,7 @@ impl MjcfWriter<'_> {
             || body.colliders().any(|(link, _)| link.is_none())
             || visuals(body, None).next().is_some()
             || body.model().frames().iter().any(|frame| frame.link.is_none());
-        let tree = Tree { id, name, body, state, collides: status.collidable, children, joints, based };
+        let tree = Tree { id, name, body, state, collidable: status.collidable, children, joints, based };
         self.base(&tree);
         for root in roots(links, Joint::Floating) {
             self.link(&tree, root, &[]);
@@ -225,9 +225,9 @@ impl MjcfWriter<'_> {
             let Some(shape) = parts.shape(part) else { continue };
             let pose = body.part_pose(part);
             let visual = visual_of(&mut left, shape, &pose);
-            let common = self.surface(&owner, parts, part, tree.collides, visual.map(|visual| &visual.appearance));
+            let common = self.surface(&owner, parts, part, tree.collidable, visual.map(|visual| &visual.appearance));
             let pose = pose * about_frame(shape);
-            self.solid(&owner, (parts, part), &pose, (tree.collides, None), &common);
+            self.solid(&owner, (parts, part), &pose, (tree.collidable, None), &common);
         }
         left.into_iter().for_each(|visual| self.visual_geom(&owner, visual));
         for frame in model.frames().iter().filter(|f| f.link == link) {

@@ -20,6 +20,8 @@ pub struct FieldSpec {
     pub kind: FieldKind,
     /// Names of the objects that it acts on; `None` for all that move.
     pub targets: Option<Vec<String>>,
+    /// Whether it acts. Default true.
+    pub enabled: bool,
 }
 
 /// The law of a [`FieldSpec`].
@@ -144,7 +146,7 @@ impl FieldSpec {
             }
         };
         let targets = if matches!(kind, FieldKind::Panels { .. }) { None } else { read_targets(f, parts, soft) };
-        Some(FieldSpec { name, kind, targets })
+        Some(FieldSpec { name, kind, targets, enabled: f.flag_or("enabled", true) })
     }
 }
 

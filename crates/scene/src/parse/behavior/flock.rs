@@ -27,6 +27,8 @@ pub struct FlockSpec {
     pub steering: Steering,
     /// Its boids.
     pub groups: Vec<BoidGroupSpec>,
+    /// Whether it takes part in the simulation. Default true.
+    pub enabled: bool,
 }
 
 /// A flock of rigid bodies and of articulated ones with a floating root.
@@ -40,6 +42,8 @@ pub struct BodyFlockSpec {
     pub helm: Helm,
     /// Names of its bodies.
     pub bodies: Vec<String>,
+    /// Whether it takes part in the simulation. Default true.
+    pub enabled: bool,
 }
 
 /// Equal boids of a flock, spread along a helix within a sphere.
@@ -65,6 +69,10 @@ pub struct BoidGroupSpec {
     pub roll_time_s: f64,
     /// Appearance.
     pub appearance: AppearanceSpec,
+    /// Whether they take part in contacts. Default true.
+    pub collidable: bool,
+    /// Whether it takes part in the simulation. Default true.
+    pub enabled: bool,
 }
 
 impl FlockSpec {
@@ -73,7 +81,7 @@ impl FlockSpec {
         let steering = read_steering(f);
         let groups = f.tables("group", MOST_GROUPS);
         let groups = groups.into_iter().map(|table| BoidGroupSpec::read(table, &name)).collect();
-        FlockSpec { name, steering, groups }
+        FlockSpec { name, steering, groups, enabled: f.flag_or("enabled", true) }
     }
 }
 
@@ -132,7 +140,7 @@ impl BodyFlockSpec {
                 }
             }
         }
-        BodyFlockSpec { name, steering, helm, bodies }
+        BodyFlockSpec { name, steering, helm, bodies, enabled: f.flag_or("enabled", true) }
     }
 }
 
@@ -150,6 +158,8 @@ impl BoidGroupSpec {
             bank_time_s: f.number_or("bank_time_s", Bound::NOT_NEGATIVE, 1.0),
             roll_time_s: f.number_or("roll_time_s", Bound::POSITIVE, 0.2),
             appearance: AppearanceSpec::read(&mut f, &AppearanceSpec::default()),
+            collidable: f.flag_or("collidable", true),
+            enabled: f.flag_or("enabled", true),
         };
         if group.count > 1 && group.spread_m == 0.0 {
             f.missing("spread_m", "`spread_m` above 0, so that the boids of the group do not start in one place");

@@ -9,7 +9,7 @@ use crate::parse::body::Library;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::loop_joint::{PartSpec, Parts};
 use field::FieldSpec;
-use flock::{BodyFlockSpec, FlockSpec};
+use flock::{BodyFlockSpec, BoidGroupSpec, FlockSpec};
 use particles::ParticleSystemSpec;
 use soft::SoftSpec;
 
@@ -71,6 +71,19 @@ impl BehaviorSpecs {
             }
         }
         specs
+    }
+
+    /// Returns the names of all objects of the behaviors, boids included.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let soft = self.soft.iter().map(|spec| spec.name.clone());
+        let systems = self.particle_systems.iter().map(|spec| spec.name.clone());
+        let flocks = self.flocks.iter().flat_map(|flock| {
+            let of = |group: &BoidGroupSpec| (0..group.count).map(|k| group.name_of(k)).collect::<Vec<String>>();
+            flock.groups.iter().flat_map(of).chain([flock.name.clone()])
+        });
+        let body_flocks = self.body_flocks.iter().map(|spec| spec.name.clone());
+        let fields = self.fields.iter().map(|spec| spec.name.clone());
+        soft.chain(systems).chain(flocks).chain(body_flocks).chain(fields).collect()
     }
 }
 

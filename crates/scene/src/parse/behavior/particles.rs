@@ -38,6 +38,8 @@ pub struct ParticleSystemSpec {
     pub end_color: Option<[f64; 3]>,
     /// Appearance of the particles.
     pub appearance: AppearanceSpec,
+    /// Whether it takes part in the simulation. Default true.
+    pub enabled: bool,
 }
 
 /// A source of particles.
@@ -58,7 +60,7 @@ impl ParticleSystemSpec {
         let appearance = base.map_or_else(AppearanceSpec::default, |material| material.appearance.clone());
         let settings = ParticleSettings {
             capacity: f.integer_or("capacity", 1..=MOST, usual.capacity as u32) as usize,
-            seed: f.integer_or("seed", 0..=u32::MAX, 0).into(),
+            seed: f.seed(),
             mass: f.number_or("mass_kg", Bound::POSITIVE, usual.mass),
             radius: f.number_or("radius_m", Bound::NOT_NEGATIVE, usual.radius),
             material: contact,
@@ -66,7 +68,7 @@ impl ParticleSystemSpec {
             linear_drag: f.number_or("linear_drag_per_s", Bound::NOT_NEGATIVE, usual.linear_drag),
             quadratic_drag: f.number_or("quadratic_drag_per_m", Bound::NOT_NEGATIVE, usual.quadratic_drag),
             wind: Vec3::from(f.vector_or("wind_m_per_s", Bound::ANY, [0.0; 3])),
-            collides: f.flag_or("collides", usual.collides),
+            collidable: f.flag_or("collidable", usual.collidable),
             group: CollisionGroup::new(f.integer_or("group", GROUPS, 0) as u8).unwrap_or_default(),
             mask: read_mask(f, u64::MAX),
             two_way: f.flag_or("two_way", usual.two_way),
@@ -82,6 +84,7 @@ impl ParticleSystemSpec {
             scale: over_life(f, "scale", Bound::NOT_NEGATIVE).unwrap_or([1.0; 2]),
             end_color: f.value("end_color").map(|value| as_color(f, "end_color", value)),
             appearance: AppearanceSpec::read(f, &appearance),
+            enabled: f.flag_or("enabled", true),
         }
     }
 }

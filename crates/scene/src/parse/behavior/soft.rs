@@ -41,6 +41,10 @@ pub struct SoftSpec {
     pub contact: Material,
     /// Appearance of its surface.
     pub appearance: AppearanceSpec,
+    /// Whether its nodes collide, if they have a radius. Default true.
+    pub collidable: bool,
+    /// Whether it takes part in the simulation. Default true.
+    pub enabled: bool,
 }
 
 /// The grid of a [`SoftSpec`].
@@ -88,6 +92,8 @@ impl SoftSpec {
             material,
             contact: read_contact(f, &of_material),
             appearance: AppearanceSpec::read(f, &appearance),
+            collidable: f.flag_or("collidable", true),
+            enabled: f.flag_or("enabled", true),
         }
     }
 }
