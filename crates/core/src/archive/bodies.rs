@@ -98,7 +98,8 @@ impl RigidRecord {
 /// A shape on a link.
 #[derive(Serialize, Deserialize)]
 struct ColliderRecord {
-    link: Option<usize>,
+    /// Index in the frames of the model.
+    link: usize,
     pose: Pose,
     shape: u32,
     material: Material,
@@ -111,7 +112,7 @@ struct ColliderRecord {
 }
 
 impl ColliderRecord {
-    fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
+    fn of(link: usize, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
         let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way } = collider;
         ColliderRecord {
             link,
@@ -127,7 +128,7 @@ impl ColliderRecord {
         }
     }
 
-    fn collider(self, tables: &LoadedTables) -> Result<(Option<usize>, Collider), ArchiveError> {
+    fn collider(self, tables: &LoadedTables) -> Result<(usize, Collider), ArchiveError> {
         let ColliderRecord {
             link,
             pose,
@@ -152,7 +153,8 @@ pub(super) struct ArticulatedRecord {
     model: Model,
     base: Pose,
     colliders: Vec<ColliderRecord>,
-    visuals: Vec<VisualRecord>,
+    /// Each with its link, an index in the frames of the model.
+    visuals: Vec<(usize, VisualRecord)>,
     cameras: Vec<CameraMount>,
     lights: Vec<LightMount>,
     dofs: Vec<DofSettings>,
@@ -170,7 +172,7 @@ impl ArticulatedRecord {
             model: body.model().clone(),
             base: *body.base(),
             colliders: parts.colliders.iter().map(|(link, c)| ColliderRecord::of(*link, c, tables)).collect(),
-            visuals: parts.visuals.iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
+            visuals: parts.visuals.iter().map(|(link, visual)| (*link, VisualRecord::of(visual, tables))).collect(),
             cameras: parts.cameras,
             lights: parts.lights,
             dofs: body.dofs().to_vec(),
@@ -192,7 +194,11 @@ impl ArticulatedRecord {
         body.self_collision = self.self_collision;
         let parts = ArticulatedParts {
             colliders: self.colliders.into_iter().map(|c| c.collider(tables)).collect::<Result<_, _>>()?,
-            visuals: self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?,
+            visuals: self
+                .visuals
+                .into_iter()
+                .map(|(link, v)| Ok((link, v.visual(tables)?)))
+                .collect::<Result<_, ArchiveError>>()?,
             cameras: self.cameras,
             lights: self.lights,
             couplings: self.couplings,

@@ -9,9 +9,10 @@ use tumble_collide::Pose;
 
 /// Everything that is fixed to the links, and the state at time 0.
 pub(crate) struct ArticulatedParts {
-    /// Each with the moving link that it is fixed to; `None` for the base.
-    pub colliders: Vec<(Option<usize>, Collider)>,
-    pub visuals: Vec<Visual>,
+    /// Each with its link, an index in [`Model::frames`](super::Model::frames).
+    pub colliders: Vec<(usize, Collider)>,
+    /// Likewise.
+    pub visuals: Vec<(usize, Visual)>,
     pub cameras: Vec<CameraMount>,
     pub lights: Vec<LightMount>,
     pub couplings: Vec<Coupling>,
@@ -40,8 +41,8 @@ impl ArticulatedBody {
 
     pub(crate) fn to_parts(&self) -> ArticulatedParts {
         ArticulatedParts {
-            colliders: self.colliders.iter().map(|part| (part.link, part.collider.clone())).collect(),
-            visuals: self.visuals.clone(),
+            colliders: self.colliders.iter().map(|part| (part.frame, part.collider.clone())).collect(),
+            visuals: self.visual_links.iter().copied().zip(self.visuals.iter().cloned()).collect(),
             cameras: self.cameras.clone(),
             lights: self.lights.clone(),
             couplings: self.couplings.clone(),
@@ -56,8 +57,17 @@ impl ArticulatedBody {
             return Err(ArticulatedError::Start { body: self.name, what: "positions", expected: self.start.len() });
         }
         let ArticulatedParts { colliders, visuals, cameras, lights, couplings, excluded_pairs, start } = parts;
-        self.colliders = colliders.into_iter().map(|(link, collider)| LinkCollider { link, collider }).collect();
-        (self.base, self.visuals, self.cameras, self.lights) = (base, visuals, cameras, lights);
+        for (frame, collider) in colliders {
+            let Some(link) = self.model.frames().get(frame).map(|found| found.link) else {
+                return Err(self.no_link(&format!("number {frame}")));
+            };
+            self.colliders.push(LinkCollider { link, frame, collider });
+        }
+        (self.visual_links, self.visuals) = visuals.into_iter().unzip();
+        if let Some(frame) = self.visual_links.iter().find(|frame| **frame >= self.model.frames().len()) {
+            return Err(self.no_link(&format!("number {frame}")));
+        }
+        (self.base, self.cameras, self.lights) = (base, cameras, lights);
         (self.couplings, self.excluded_pairs) = (couplings, excluded_pairs);
         self.start = start;
         Ok(self)

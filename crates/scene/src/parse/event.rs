@@ -73,10 +73,10 @@ pub(crate) enum ObjectKind {
     Body { mode: Mode, sensor: bool },
     /// An articulated body.
     Articulated,
-    /// One of its links.
-    Link,
-    /// A loop joint.
-    Joint,
+    /// One of its links, and whether its joint has a drive with a target.
+    Link { driven: bool },
+    /// A loop joint, likewise.
+    Joint { driven: bool },
     /// A coupling of two joints.
     Mimic,
     /// A template, and the number of its bodies.
@@ -87,12 +87,12 @@ pub(crate) enum ObjectKind {
 
 impl ObjectKind {
     pub(crate) fn is_body(self) -> bool {
-        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Link)
+        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated | ObjectKind::Link { .. })
     }
 
     /// Returns whether it is an object of its own, and not a part of one.
     pub(crate) fn is_object(self) -> bool {
-        !matches!(self, ObjectKind::Link | ObjectKind::Template(_))
+        !matches!(self, ObjectKind::Link { .. } | ObjectKind::Template(_))
     }
 }
 
@@ -241,7 +241,12 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             })
         }
         "broken" => {
-            let joint = names.read(&mut f, "broken", |kind| kind == ObjectKind::Joint, "the name of a loop joint");
+            let joint = names.read(
+                &mut f,
+                "broken",
+                |kind| matches!(kind, ObjectKind::Joint { .. }),
+                "the name of a loop joint",
+            );
             joint.map(|joint| Trigger::Breaks { joint })
         }
         "key" => f.text("key", "the name of a key, such as \"k\"").and_then(|(key, value)| {

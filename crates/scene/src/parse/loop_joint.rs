@@ -72,6 +72,10 @@ pub struct LoopJointSpec {
 pub(crate) trait Parts {
     /// Returns the part of that name: `body`, or `object/link`.
     fn part(&self, name: &str) -> Option<PartSpec>;
+    /// Returns the joint that moves a link, that of its carrier for a fixed one; `None` for a body and a link on the base.
+    fn moving_joint(&self, part: &PartSpec) -> Option<&JointSpec>;
+    /// Returns the joint between a link and its parent; `None` for a body.
+    fn own_joint(&self, part: &PartSpec) -> Option<&JointSpec>;
     /// Returns the index of the articulated body of that name.
     fn articulated(&self, name: &str) -> Option<usize>;
     /// Returns whether the root of an articulated body floats.
@@ -147,6 +151,17 @@ impl LoopJointSpec {
             false => None,
         };
         let settings = read_settings(&mut f, kind, Vec3::from(axis));
+        let length = length_m.or_else(|| length_at_start(kind, position_m, second_position_m?, ground_m, ratio));
+        if let (Some(limits), Some(length), Some(value)) = (settings.dof.limits, length, f.value("limits_m"))
+            && kind.limits_fault(limits, length).is_some()
+        {
+            let keeps = if kind == LoopJointKind::Distance { "keeps" } else { "allows at most" };
+            f.wrong(
+                "limits_m",
+                value,
+                format!("limits from 0 that allow the length which the joint {keeps}, {length} m"),
+            );
+        }
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
         let enabled = f.flag_or("enabled", true);
@@ -176,6 +191,15 @@ impl LoopJointSpec {
             breaking_torque_n_m,
             enabled,
         })
+    }
+}
+
+/// Returns the length of a joint that has that of its placement, m.
+fn length_at_start(kind: LoopJointKind, a: [f64; 3], b: [f64; 3], ground: [[f64; 3]; 2], ratio: f64) -> Option<f64> {
+    let distance = |a: [f64; 3], b: [f64; 3]| (Vec3::from(a) - Vec3::from(b)).norm();
+    match kind {
+        LoopJointKind::Pulley => Some(distance(a, ground[0]) + ratio * distance(b, ground[1])),
+        _ => kind.has_length().then(|| distance(a, b)),
     }
 }
 

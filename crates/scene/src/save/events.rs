@@ -182,7 +182,7 @@ impl Writer<'_> {
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
         let on = match sensor.place() {
-            SensorPlace::Site(Anchor { part: None, frame }) => {
+            SensorPlace::Site(Anchor { part: None, frame, .. }) => {
                 t.put_pose(frame);
                 None
             }

@@ -198,8 +198,8 @@ impl LoopJoint {
     /// pass its stops. A joint of a world gets other limits by [`World::change_joint`](crate::World::change_joint). The limits of a spherical joint are 0 and the half angle of a cone.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
-    /// without a position.
+    /// [`LoopJointError::Range`] for a setting out of its range, and for limits that exclude the length that the joint
+    /// keeps; [`LoopJointError::Kind`] for a joint without a position.
     pub fn set_dof(&mut self, dof: DofSettings) -> Result<(), LoopJointError> {
         if dof != DofSettings::default() && !self.kind.has_position() {
             return Err(self.wrong_kind("limits, damping, friction, springs and drives"));
@@ -223,6 +223,9 @@ impl LoopJoint {
                 expected: "at most 2π: its angle has no count of turns",
             });
         }
+        if let Some(limits) = dof.limits {
+            self.check_limits(limits, self.length)?;
+        }
         if let (LoopJointKind::Spring, Some(spring)) = (self.kind, dof.spring) {
             self.length = spring.rest;
         }
@@ -233,13 +236,16 @@ impl LoopJoint {
     /// Sets the length of a distance, a rope or a spring, m.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a length that is not finite and at least 0,
+    /// [`LoopJointError::Range`] for a length that is not finite and at least 0, or that the limits exclude,
     /// [`LoopJointError::Kind`] for a joint without a length.
     pub fn set_length(&mut self, length: f64) -> Result<(), LoopJointError> {
         if !self.kind.has_length() {
             return Err(self.wrong_kind("length"));
         }
         self.check("the length", length, length.is_finite() && length >= 0.0, "finite and at least 0")?;
+        if let Some(limits) = self.dof.limits {
+            self.check_limits(limits, length)?;
+        }
         self.length = length;
         if let (LoopJointKind::Spring, Some(spring)) = (self.kind, &mut self.dof.spring) {
             spring.rest = length;
@@ -471,6 +477,16 @@ impl LoopJoint {
 
     fn wrong_kind(&self, what: &'static str) -> LoopJointError {
         LoopJointError::Kind { name: self.name.clone(), kind: self.kind.name(), what }
+    }
+
+    /// Checks that limits allow the length that the joint keeps.
+    fn check_limits(&self, [lower, upper]: [f64; 2], length: f64) -> Result<(), LoopJointError> {
+        match self.kind.limits_fault([lower, upper], length) {
+            Some((what, value, expected)) => {
+                Err(LoopJointError::Range { name: self.name.clone(), what, value, expected })
+            }
+            None => Ok(()),
+        }
     }
 
     fn check(&self, what: &'static str, value: f64, fine: bool, expected: &'static str) -> Result<(), LoopJointError> {
