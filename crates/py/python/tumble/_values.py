@@ -73,7 +73,7 @@ class Firing(NamedTuple):
     event: str
     """Name of the event."""
     other: str | None
-    """Name of the body that made it fire: the visitor of a sensor, or the second side of a contact."""
+    """Name of the body that made it fire: the visitor of a sensor, the second side of a contact, or the one that fell asleep or woke."""
     time: float
     """Simulated time, s."""
     impulse: NDArray[np.float64]

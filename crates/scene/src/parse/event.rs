@@ -176,7 +176,10 @@ impl ObjectNames {
 }
 
 /// The keys that say when, of which an event has one.
-const WHEN: [&str; 9] = ["time_s", "every_s", "contact", "parting", "enters", "leaves", "broken", "key", "after"];
+const WHEN: [&str; 12] = [
+    "time_s", "every_s", "contact", "touching", "parting", "enters", "leaves", "asleep", "awake", "broken", "key",
+    "after",
+];
 
 impl EventSpec {
     /// Reads an event. `lights` is the number of lights of the scene.
@@ -227,9 +230,18 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             let [a, b] = read_sides(&mut f, "contact", names);
             Some(Trigger::Contact { a, b, impulse: f.number_or("impulse_n_s", Bound::NOT_NEGATIVE, 0.0) })
         }
+        "touching" => {
+            let [a, b] = read_sides(&mut f, "touching", names);
+            Some(Trigger::Touching { a, b })
+        }
         "parting" => {
             let [a, b] = read_sides(&mut f, "parting", names);
             Some(Trigger::Parting { a, b })
+        }
+        "asleep" | "awake" => {
+            let some = |value: &&Value<'_>| value.get_ref().as_array().is_none_or(|items| !items.is_empty());
+            let bodies = f.value(key).filter(some).map_or(Vec::new(), |value| names.side(&f, key, value));
+            Some(if key == "asleep" { Trigger::Asleep { bodies } } else { Trigger::Awake { bodies } })
         }
         "enters" | "leaves" => {
             let sensor = |kind| matches!(kind, ObjectKind::Body { sensor: true, .. });
