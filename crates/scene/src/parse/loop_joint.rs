@@ -224,9 +224,26 @@ fn read_settings(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> JointSp
     match kind {
         LoopJointKind::Spherical => joint.read_cone(f),
         _ if kind.has_position() => joint.read_settings(f, kind != LoopJointKind::Spring),
-        _ => {}
+        _ => refuse_settings(f, kind),
     }
     joint
+}
+
+/// Reports settings of a position of a kind that has none.
+fn refuse_settings(f: &mut Fields<'_>, kind: LoopJointKind) {
+    for key in ["drive", "spring", "limits_rad", "limits_deg", "limits_m"] {
+        let given = f.entries().find(|(name, ..)| *name == key).and_then(|_| f.value(key));
+        if let Some(value) = given {
+            let positioned = LoopJointKind::NAMES.iter().filter(|(_, kind)| kind.has_position());
+            let names: Vec<&str> = positioned.map(|(name, _)| *name).collect();
+            let none = format!(
+                "no `{key}` of type \"{}\", which has no position; types with one: {}",
+                kind.name(),
+                names.join(", ")
+            );
+            f.wrong(key, value, none);
+        }
+    }
 }
 
 /// Reads the numbers of teeth of two gears.

@@ -172,7 +172,7 @@ fn faults_of_sensors_are_reported_with_their_place() {
         ("type = \"drive_force\"\non = \"post/cap\"", "expected a link with a revolute or prismatic joint"),
         ("type = \"joint_position\"\non = \"box\"", "expected a link with a revolute or prismatic joint"),
         ("type = \"joint_position\"\non = \"hook\"", "expected a loop joint with a position"),
-        ("type = \"gyroscope\"\non = \"hook\"", "it reads a site"),
+        ("type = \"gyroscope\"\non = \"hook\"", "expected a body or a link: this type of sensor reads a site"),
     ] {
         let said = fault(sensor);
         assert!(said.contains(expected), "{sensor}: {said}");
