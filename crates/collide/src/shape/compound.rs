@@ -385,8 +385,10 @@ impl<'de> Deserialize<'de> for CompoundShape {
                 StoredShape::RoundedBox(half_extents, rounding) => Shape::RoundedBox { half_extents, rounding },
                 StoredShape::RoundedCylinder(core, rounding) => Shape::RoundedCylinder { core, rounding },
             };
-            CompoundPart { shape, pose, density, name }
+            shape.validate()?;
+            Ok(CompoundPart { shape, pose, density, name })
         };
-        CompoundShape::new(stored.into_iter().map(part).collect()).map_err(serde::de::Error::custom)
+        let parts = stored.into_iter().map(part).collect::<Result<Vec<_>, ShapeError>>();
+        parts.and_then(CompoundShape::new).map_err(serde::de::Error::custom)
     }
 }

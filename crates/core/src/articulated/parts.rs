@@ -2,6 +2,7 @@
 
 use super::body::{ArticulatedBody, ArticulatedError};
 use super::collider::{Collider, LinkCollider};
+use crate::BodyError;
 use crate::articulated::model::dof::Coupling;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
@@ -51,6 +52,26 @@ impl ArticulatedBody {
         }
     }
 
+    /// Checks a collider of damaged bytes.
+    fn check_read(&self, link: usize, collider: &Collider) -> Result<(), ArticulatedError> {
+        let wrong = |why| ArticulatedError::Collider {
+            body: self.name.clone(),
+            link: self.model.frames()[link].name.clone(),
+            why,
+        };
+        let range = |what, value, expected| wrong(BodyError::Range { what, value, expected });
+        let material = collider.material.validate();
+        material.map_err(|(what, value, expected)| range(what, value, expected))?;
+        let unit = collider.pose.rotation.norm();
+        if !((unit - 1.0).abs() < 1e-6) {
+            return Err(range("norm of the orientation", unit, "1"));
+        }
+        if let Some(value) = collider.pose.translation.vector.iter().find(|x| !x.is_finite()) {
+            return Err(range("a position", *value, "finite"));
+        }
+        self.check_collider(link, collider).map_err(wrong)
+    }
+
     /// Adds the parts to a body without any, whose model is already placed on `base`.
     pub(crate) fn with_parts(mut self, base: Pose, parts: ArticulatedParts) -> Result<Self, ArticulatedError> {
         if !self.is_state(&parts.start) {
@@ -61,14 +82,22 @@ impl ArticulatedBody {
             let Some(link) = self.model.frames().get(frame).map(|found| found.link) else {
                 return Err(self.no_link(&format!("number {frame}")));
             };
+            self.check_read(frame, &collider)?;
             self.colliders.push(LinkCollider { link, frame, collider });
         }
         (self.visual_links, self.visuals) = visuals.into_iter().unzip();
+        let parts = self.model.links().len() + 1;
+        let shown = self.visuals.iter().map(|visual| visual.part);
+        let mounted = cameras.iter().map(|camera| camera.part).chain(lights.iter().map(|light| light.part));
+        if let Some(part) = shown.chain(mounted).find(|part| *part >= parts) {
+            return Err(self.no_link(&format!("number {part}")));
+        }
         if let Some(frame) = self.visual_links.iter().find(|frame| **frame >= self.model.frames().len()) {
             return Err(self.no_link(&format!("number {frame}")));
         }
         (self.base, self.cameras, self.lights) = (base, cameras, lights);
-        (self.couplings, self.excluded_pairs) = (couplings, excluded_pairs);
+        couplings.into_iter().try_for_each(|coupling| self.couple(coupling))?;
+        self.excluded_pairs = excluded_pairs;
         self.start = start;
         Ok(self)
     }
