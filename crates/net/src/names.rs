@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use tumble_core::{ArticulatedBody, ObjectId, World};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What has a frame of its own in a recording.
+/// An entity with a frame of its own in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Site {
     /// A part of an object.

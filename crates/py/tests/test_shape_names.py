@@ -140,7 +140,7 @@ def test_a_part_of_a_link_brakes_with_its_own_friction(which: str) -> None:
 def test_wrong_surfaces_of_shapes_of_links_are_errors() -> None:
     world = tumble.World()
     body = world.add_articulation(arm())
-    with pytest.raises(ValueError, match="link 'upper' has no shape 4; it has 4 that collide"):
+    with pytest.raises(ValueError, match="link 'upper' has no shape 4; it has 3 that collide"):
         body.set_shape_material("upper", 4, friction=1)
     with pytest.raises(ValueError, match="friction is -1"):
         body.set_shape_material("upper", "inner", friction=-1)

@@ -143,7 +143,7 @@ impl Viewer {
 /// let mut world = World::default();
 /// world.add_static(RigidBody::fixed(Shape::half_space()))?;
 /// world.add(RigidBody::new(Shape::sphere(0.1)?).with_mass(1.0).with_pose(Pose::translation(0.0, 0.0, 2.0)))?;
-/// view(&mut world, &WindowOptions::new("a ball", [1280, 720]))?;
+/// view(&mut world, &WindowOptions::new("a fall", [1280, 720]))?;
 /// println!("closed after {} s", world.time());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -151,7 +151,7 @@ impl Viewer {
 /// # Errors
 /// [`ViewError`]: there is no desktop or graphics adapter, or a step failed.
 pub fn view(world: &mut World, options: &WindowOptions) -> Result<(), ViewError> {
-    view_with(world, options, |world| world.step().map(drop))
+    view_with(world, options, |world| Ok(world.step().map(drop)?))
 }
 
 /// As [`view`], with a function that takes each step, so it can set forces and drives before.
