@@ -230,7 +230,7 @@ fn lasting_contacts_sleep_and_waking_fire() {
             ("never", Trigger::Asleep { bodies: vec![floor] }),
         ];
         let ids = triggers.map(|(name, t)| world.add(ScriptedEvent::new(name, t)).unwrap());
-        let mut times = ids.map(|_| Vec::new());
+        let mut times = ids.map(|_| Vec::<i32>::new());
         for frame in 1..=250 {
             world.step().unwrap();
             let lasts = |e: &&Event| e.kind == EventKind::ContactPersist && (e.a, e.b) == (floor, Some(block));
