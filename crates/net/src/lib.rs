@@ -8,6 +8,7 @@
 
 pub mod browser;
 pub mod control;
+mod names;
 pub mod record;
 pub mod sync;
 pub mod vrpn;

@@ -1,14 +1,14 @@
 //! Conversion of a world to the entities and poses of a recording.
 
+use crate::names::{Names, Site, shortened};
 use crate::record::{
-    Contact, Deforming, Entity, MAX_CONTACTS, MAX_EVENTS, MAX_NAME_BYTES, Point, Pose, Readings, RecordedEvent, Shape,
-    Surface, VisualPart,
+    Contact, Deforming, Entity, MAX_CONTACTS, MAX_EVENTS, Point, Pose, Readings, RecordedEvent, Shape, Surface,
+    VisualPart,
 };
 use nalgebra::Translation3;
 use std::collections::BTreeMap;
 use tumble_collide::{Shape as Solid, TriMesh, Vec3};
-use tumble_core::{ContactPoint, Drawn, Event, EventKind, ObjectId, RigidBody, World};
-use xxhash_rust::xxh3::xxh3_64;
+use tumble_core::{ArticulatedBody, ContactPoint, Drawn, Event, EventKind, ObjectId, RigidBody, Visual, World};
 
 /// Sides of a rounded cylinder.
 const SIDES: usize = 48;
@@ -42,27 +42,31 @@ pub fn deforming(world: &World) -> Deforming {
     shown
 }
 
-/// Returns every drawable part as one entity. It has the name of its object, followed by `/part` if
-/// the object has several parts. The nodes of a surface are no entities ([`deforming`] has the surface). A name of more than [`MAX_NAME_BYTES`] is replaced by its
-/// beginning and a hash of the whole.
+/// Returns every body and every link as one entity, fixed links too. A link has the name `BODY/LINK`, or `BODY/NUMBER` with its
+/// index in [`Model::frames`](tumble_core::Model::frames) if a link of the body has no name, or another entity the same one; a
+/// part of another object with several parts has `OBJECT/NUMBER`. The nodes of a surface are no entities ([`deforming`] has
+/// the surface). A name of more than [`MAX_NAME_BYTES`](crate::record::MAX_NAME_BYTES) is replaced by its beginning and a
+/// hash of the whole.
 pub fn entities(world: &World) -> Vec<Entity> {
-    sites(world).map(|(id, part)| entity(world, id, part)).collect()
+    let names = Names::of(world);
+    sites(world).map(|site| Entity { name: names.site(site), parts: drawn_parts(world, site) }).collect()
 }
 
 /// Returns the poses of the entities, in the order of [`entities`].
 pub fn poses(world: &World) -> Vec<Pose> {
-    sites(world).filter_map(|(id, part)| world.pose(id, part)).map(|frame| pose(&frame)).collect()
+    sites(world).filter_map(|site| site_pose(world, site)).map(|frame| pose(&frame)).collect()
 }
 
 /// Returns the contacts of the last step between the [`entities`] whose surfaces touch. Of more
 /// than [`MAX_CONTACTS`], those with the largest forces are kept, the largest first.
 pub fn contacts(world: &World) -> Vec<Contact> {
-    let index: BTreeMap<(ObjectId, usize), u32> = sites(world).zip(0..).collect();
+    let index: BTreeMap<Site, u32> = sites(world).zip(0..).collect();
+    let entity = |id, part| index.get(&Site::of_part(world, id, part)?).copied();
     let contact = |c: &ContactPoint| {
         Some(Contact {
-            a: *index.get(&(c.a, c.part_a))?,
-            b: *index.get(&(c.b, c.part_b))?,
-            shapes: [c.shape_a as u32, c.shape_b as u32],
+            a: entity(c.a, c.part_a)?,
+            b: entity(c.b, c.part_b)?,
+            shapes: [shape_number(world, c.a, c.part_a, c.shape_a), shape_number(world, c.b, c.part_b, c.shape_b)],
             point: c.point.into(),
             normal: c.normal.into(),
             depth: c.depth,
@@ -82,13 +86,32 @@ pub fn readings(world: &World) -> Readings {
 pub fn events(world: &World) -> Vec<RecordedEvent> {
     let kind =
         |event: &Event| EventKind::NAMES.iter().find(|(_, kind)| *kind == event.kind).map_or("", |(name, _)| name);
-    let one = |event: &Event| RecordedEvent {
-        kind: kind(event).to_owned(),
-        a: name(world, event.a, event.part_a),
-        b: event.b.map(|b| name(world, b, event.part_b)),
-        shapes: [event.shape_a as u32, event.shape_b as u32],
-        impulse: event.impulse.into(),
-        point: event.point.into(),
+    let names = Names::of(world);
+    let one = |event: &Event| {
+        let sides = [(Some(event.a), event.part_a, event.shape_a), (event.b, event.part_b, event.shape_b)];
+        let pairs = event.is_of_parts();
+        let side = |(id, part, _): (Option<ObjectId>, usize, usize)| {
+            let site = Site::of_part(world, id?, part).filter(|_| pairs);
+            Some(site.map_or_else(|| names.object(id.unwrap_or_default()), |site| names.site(site)))
+        };
+        let link = |(id, part, _): (Option<ObjectId>, usize, usize)| {
+            world.part_name(id?, part).filter(|_| pairs).map(|link| shortened(link.to_owned()))
+        };
+        let shape_name = |(id, part, shape): (Option<ObjectId>, usize, usize)| {
+            world.shape_name(id?, part, shape).filter(|_| event.has_shapes()).map(|name| shortened(name.to_owned()))
+        };
+        let [a, b] = sides.map(side);
+        RecordedEvent {
+            kind: kind(event).to_owned(),
+            a: a.unwrap_or_default(),
+            b,
+            bodies: sides.map(|(id, _, _)| id.map(|id| names.object(id))),
+            links: sides.map(link),
+            shapes: sides.map(|(id, part, shape)| id.map_or(0, |id| shape_number(world, id, part, shape))),
+            shape_names: sides.map(shape_name),
+            impulse: event.impulse.into(),
+            point: event.point.into(),
+        }
     };
     world.events().iter().take(MAX_EVENTS).map(one).collect()
 }
@@ -96,14 +119,25 @@ pub fn events(world: &World) -> Vec<RecordedEvent> {
 /// Shows recorded contacts in a world that has the same entities, as those of its last step.
 /// Velocities and impulses are not recorded and are zero.
 pub fn show_contacts(world: &mut World, contacts: &[Contact]) {
-    let entities: Vec<(ObjectId, usize)> = sites(world).collect();
+    let entities: Vec<Site> = sites(world).collect();
+    let side = |entity: u32, shape: u32| match *entities.get(entity as usize)? {
+        Site::Part(id, part) => Some((id, part, shape as usize)),
+        Site::Link(id, link) => {
+            let (part, shape, _) = world.get::<ArticulatedBody>(id)?.shapes_of(link).nth(shape as usize)?;
+            Some((id, part, shape))
+        }
+    };
     let point = |c: &Contact| {
-        let (&(a, part_a), &(b, part_b)) = (entities.get(c.a as usize)?, entities.get(c.b as usize)?);
-        let [shape_a, shape_b] = c.shapes.map(|shape| shape as usize);
-        let sides = [(a, part_a, shape_a), (b, part_b, shape_b)];
+        let sides = [side(c.a, c.shapes[0])?, side(c.b, c.shapes[1])?];
         Some(ContactPoint::shown(sides, c.point.into(), c.normal.into(), c.depth, c.force.into()))
     };
-    world.replica().set_contacts(contacts.iter().filter_map(point));
+    let shown: Vec<ContactPoint> = contacts.iter().filter_map(point).collect();
+    world.replica().set_contacts(shown);
+}
+
+/// Returns the number of a shape among those of its body or link, for the part and the index that contacts report.
+fn shape_number(world: &World, id: ObjectId, part: usize, shape: usize) -> u32 {
+    world.get::<ArticulatedBody>(id).map_or(shape, |body| body.shape_number(part, shape)) as u32
 }
 
 /// Returns the contacts of the last step whose surfaces touch. If there are more than `max`, those
@@ -122,46 +156,55 @@ pub(crate) fn strongest(world: &World, max: usize) -> Vec<&ContactPoint> {
 
 /// Returns the names of the entities, in the order of [`entities`].
 pub fn names(world: &World) -> Vec<String> {
-    sites(world).map(|(id, part)| name(world, id, part)).collect()
+    let names = Names::of(world);
+    sites(world).map(|site| names.site(site)).collect()
 }
 
-fn name(world: &World, id: ObjectId, part: usize) -> String {
-    let name = world.name(id).unwrap_or_default();
-    let several = world.view().state_range(id).is_some_and(|span| span.parts.len() > 1);
-    shortened(if several { format!("{name}/{part}") } else { name.to_owned() })
-}
-
-/// Returns a name of at most [`MAX_NAME_BYTES`]. A longer name is replaced by its beginning, `~`,
-/// and 16 hexadecimal digits, the XXH3 of the whole name.
-fn shortened(name: String) -> String {
-    if name.len() <= MAX_NAME_BYTES {
-        return name;
-    }
-    let hash = format!("~{:016x}", xxh3_64(name.as_bytes()));
-    let room = MAX_NAME_BYTES - hash.len();
-    let end = (0..=room).rev().find(|&n| name.is_char_boundary(n)).unwrap_or(0);
-    name[..end].to_owned() + &hash
-}
-
-fn sites(world: &World) -> impl Iterator<Item = (ObjectId, usize)> + '_ {
+fn sites(world: &World) -> impl Iterator<Item = Site> + '_ {
     let whole = |id: ObjectId| world.object(id).and_then(|o| o.renderable()).is_some_and(|r| r.surface().is_some());
     let parts = move |id: ObjectId| {
         if whole(id) { 0 } else { world.view().state_range(id).map_or(0, |span| span.parts.len()) }
     };
-    world.ids().iter().flat_map(move |&id| (0..parts(id)).map(move |part| (id, part)))
+    world.ids().iter().flat_map(move |&id| {
+        let links = world.get::<ArticulatedBody>(id).map(|body| body.model().frames().len());
+        (0..links.unwrap_or_else(|| parts(id))).map(move |number| match links {
+            Some(_) => Site::Link(id, number),
+            None => Site::Part(id, number),
+        })
+    })
 }
 
-fn entity(world: &World, id: ObjectId, part: usize) -> Entity {
-    let object = world.object(id);
-    let visuals = object.and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
-    let center = world.get::<RigidBody>(id).map_or(Vec3::zeros(), RigidBody::center_of_mass);
-    let parts = visuals.iter().filter(|v| v.part == part).filter_map(|v| {
-        let [r, g, b] = v.appearance.color;
+/// Returns the present pose of a site in the world.
+fn site_pose(world: &World, site: Site) -> Option<tumble_collide::Pose> {
+    match site {
+        Site::Part(id, part) => world.pose(id, part),
+        Site::Link(id, link) => {
+            let model = world.get::<ArticulatedBody>(id)?.model();
+            let frame = model.frames().get(link)?;
+            Some(world.pose(id, frame.link.unwrap_or(model.links().len()))? * frame.pose)
+        }
+    }
+}
+
+fn drawn_parts(world: &World, site: Site) -> Vec<VisualPart> {
+    let part = |visual: &Visual, frame: &tumble_collide::Pose| {
+        let [r, g, b] = visual.appearance.color;
         let color = [r, g, b, 1.0].map(f64::from).map(|c| c as _);
-        let placed = Translation3::from(center) * v.pose;
-        Some(VisualPart { shape: drawn(v.drawn()?), pose: pose(&placed), color })
-    });
-    Entity { name: name(world, id, part), parts: parts.collect() }
+        Some(VisualPart { shape: drawn(visual.drawn()?), pose: pose(&(frame * visual.pose)), color })
+    };
+    match site {
+        Site::Part(id, number) => {
+            let visuals = world.object(id).and_then(|o| o.renderable()).map_or(&[][..], |r| r.visuals());
+            let center = world.get::<RigidBody>(id).map_or(Vec3::zeros(), RigidBody::center_of_mass);
+            let frame = tumble_collide::Pose::from(Translation3::from(center));
+            visuals.iter().filter(|v| v.part == number).filter_map(|v| part(v, &frame)).collect()
+        }
+        Site::Link(id, link) => {
+            let Some(body) = world.get::<ArticulatedBody>(id) else { return Vec::new() };
+            let frame = body.model().frames()[link].pose.inverse();
+            body.visuals_of_links().filter(|(of, _)| *of == link).filter_map(|(_, v)| part(v, &frame)).collect()
+        }
+    }
 }
 
 fn pose(pose: &tumble_collide::Pose) -> Pose {

@@ -1,11 +1,13 @@
 """Events, sensors, groups and ignored pairs, in Python and in scene files."""
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tumble
+from tumble import Trigger
 
 
 def bouncing():
@@ -130,3 +132,65 @@ def test_a_sleeping_body_is_reported_once():
     found = kinds(world, 240)
     assert [event for event in found if event[0] in ("asleep", "awake")] == [("asleep", "crate", None)]
     assert np.allclose([event.impulse for event in world.events], 0)
+
+
+def standing_leg() -> tumble.World:
+    """A leg on a slider that stands on its foot, which a fixed joint holds on the calf."""
+    world = tumble.World(dt=1 / 240)
+    world.add_static("ground", tumble.HalfSpace().named("soil"))
+    builder = tumble.ArticulationBuilder("leg")
+    builder.add_link("calf", joint="prismatic", axis=(0, 0, 1), position=(0, 0, 0.5), shape=tumble.Sphere(0.05), mass=1)
+    builder.add_link("foot", "calf", joint="fixed", position=(0, 0, -0.4), shape=tumble.Sphere(0.1).named("sole"), mass=1)
+    world.add_articulation(builder)
+    return world
+
+
+def test_contacts_events_and_touch_sensors_name_the_fixed_link_of_the_user(tmp_path: Path) -> None:
+    world = standing_leg()
+    felt = {link: world.add_sensor("touch", f"leg/{link}", name=link) for link in ("calf", "foot")}
+    with tumble.Recorder(tmp_path / "leg.mcap") as recorder:
+        recorder.run(world, 60)
+    (contact,) = world.contacts
+    sides = sorted(zip(contact["bodies"].tolist(), contact["parts"].tolist(), contact["shapes"].tolist()))
+    assert sides == [(0, 0, 0), (1, 1, 0)]
+    assert world["leg"].link_names[1] == "foot" and world.shape_name("leg", 1, 0) == "sole"
+    (event,) = world.events
+    assert (event.kind, event.parts, event.links, event.shape_names) == ("contact_persist", (0, 1), (None, "foot"), ("soil", "sole"))
+    assert felt["calf"].value[0] == 0 and felt["foot"].value[0] == pytest.approx(2 * 9.81, abs=1e-6)
+    recording = tumble.read(tmp_path / "leg.mcap")
+    assert recording.names == ["ground", "leg/calf", "leg/foot"]
+    assert recording.position("leg/foot")[-1] == pytest.approx([0, 0, 0.1], abs=1e-6)
+    (recorded,) = recording.events[-1]
+    assert (recorded.a, recorded.b, recorded.bodies) == ("ground", "leg/foot", ("ground", "leg"))
+    assert (recorded.links, recorded.shapes, recorded.shape_names) == ((None, "foot"), (0, 0), ("soil", "sole"))
+    found = recording.contacts[-1][0]
+    assert sorted(zip(found["bodies"].tolist(), found["shapes"].tolist())) == [(0, 0), (2, 0)]
+
+
+def test_every_kind_of_event_has_a_trigger() -> None:
+    world = tumble.World(dt=1 / 240, sleep_after=0.5)
+    world.add_static("ground", tumble.HalfSpace())
+    block = world.add_rigid("block", tumble.Box((0.4, 0.4, 0.4)), mass=10, position=(0, 0, 0.2))
+    world.add_rigid("ball", tumble.Sphere(0.1), mass=2, position=(0, 0, 4.5))
+    fired: dict[str, list[tuple[float, str | None]]] = {}
+
+    def note(view: tumble.View, firing: tumble.Firing) -> None:
+        fired.setdefault(firing.event, []).append((firing.time, firing.other))
+
+    triggers = {
+        "begin": Trigger.contact("ground", block),
+        "persist": Trigger.touching("ground", block),
+        "asleep": Trigger.asleep([block]),
+        "awake": Trigger.awake(),
+    }
+    for name, trigger in triggers.items():
+        world.add_event(name, trigger, [note])
+    persisted = 0
+    for _ in range(240):
+        world.step()
+        persisted += sum(event.kind == "contact_persist" and event.a.name == "ground" and event.b is not None and event.b.name == "block" for event in world.events)
+    assert len(fired["begin"]) == len(fired["asleep"]) == len(fired["awake"]) == 1
+    assert len(fired["persist"]) == persisted > 100
+    # half a second of rest; and the fall of the ball by 4 m
+    assert fired["asleep"][0][0] == pytest.approx(0.5, abs=0.01) and fired["awake"][0][0] == pytest.approx((8 / 9.81) ** 0.5, abs=0.01)
+    assert {other for firings in fired.values() for _, other in firings} == {"block"}

@@ -158,3 +158,28 @@ def test_the_kinds_are_those_of_the_types():
         if kind not in ("force", "torque", "joint_position", "joint_velocity", "drive_force"):
             sensor = world.add_sensor(kind, ball, name=kind)
             assert sensor.kind == kind
+
+
+def test_sensors_and_limits_that_cannot_be_are_refused_with_what_would_be_right():
+    world = tumble.World()
+    builder = tumble.ArticulationBuilder("arm")
+    builder.add_link("stand", joint="fixed")
+    builder.add_link("lift", "stand", joint="prismatic", axis=(0, 0, 1), mass=1, center_of_mass=(0, 0, 0), inertia=(1, 1, 1))
+    builder.add_link("hand", "lift", joint="fixed", mass=1, center_of_mass=(0, 0, 0), inertia=(1, 1, 1))
+    world.add_articulation(builder)
+    for link in ("stand", "hand"):
+        with pytest.raises(ValueError, match=f"on: expected a link that a revolute or prismatic joint .* got 'arm/{link}'"):
+            world.add_sensor("joint_position", f"arm/{link}")
+    with pytest.raises(ValueError, match="at a link of an articulated body that a joint moves, or at a loop joint"):
+        world.add_sensor("force", "arm/stand")
+    world.add_sensor("force", "arm/hand")
+    x, y = (world.add_rigid(name, tumble.Sphere(0.1), mass=1, position=(at, 0, 0)) for name, at in (("x", 0), ("y", 1)))
+    gear = world.add_joint("gear", x, y, (0, 0, 0), (0, 0, 1), teeth=(2, 3))
+    with pytest.raises(ValueError, match="gear"):
+        world.add_sensor("joint_position", gear)
+    with pytest.raises(ValueError, match="gear"):
+        world.add_joint("gear", x, y, (0, 0, 0), (0, 0, 1), teeth=(2, 3), drive={"velocity": 1})
+    ends = {"point": (0, 0, 0), "second_point": (1, 0, 0)}
+    with pytest.raises(ValueError, match="the lower limit of its length is 2; it must be at most the length of the joint"):
+        world.add_joint("distance", x, y, **ends, limits=(2, 3))
+    world.add_joint("distance", x, y, **ends, limits=(1, 3))

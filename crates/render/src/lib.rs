@@ -33,7 +33,9 @@ mod image;
 mod list;
 mod material;
 mod mesh;
+mod orbit;
 mod sliders;
+mod viewer;
 mod viewpoint;
 mod window;
 
@@ -60,6 +62,7 @@ pub use list::{
 pub use material::{Material, Pattern, Shader, Texture};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};
 pub use sliders::{Slider, SliderPanel};
+pub use viewer::{ViewError, Viewer, view, view_with};
 pub use viewpoint::{Lens, Part, Viewpoint};
 pub use window::{Next, WindowApp, WindowOptions, run_window};
 pub use winit;

@@ -2,6 +2,10 @@
 
 #![allow(clippy::disallowed_methods)] // expected numbers may come from the platform
 
+// the fuzz target of archives asks for its macro by this name
+extern crate self as libfuzzer_sys;
+
+mod archive_fuzz;
 mod archives;
 mod boids;
 mod buoyancy;
@@ -47,6 +51,16 @@ impl Numbers {
     pub fn vector(&mut self, size: f64) -> Vec3 {
         size * Vec3::new(self.number(), self.number(), self.number())
     }
+}
+
+/// Replaces the macro of `libfuzzer_sys`: makes a target a function of its bytes.
+#[macro_export]
+macro_rules! fuzz_target {
+    (|$bytes:ident: &[u8]| $body:block) => {
+        pub fn target($bytes: &[u8]) {
+            $body
+        }
+    };
 }
 
 /// Steps a world.

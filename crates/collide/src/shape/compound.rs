@@ -237,13 +237,6 @@ impl CompoundShape {
         })
     }
 
-    /// Returns the same compound with `link/` before the names of its parts.
-    pub(super) fn with_names_in(&self, link: &str) -> CompoundShape {
-        let mut named = self.clone();
-        named.parts.iter_mut().filter_map(|part| part.name.as_mut()).for_each(|name| *name = format!("{link}/{name}"));
-        named
-    }
-
     /// Returns the surfaces of all parts as triangles, in the frame of the compound; round parts with
     /// 48 sides. For drawing.
     pub fn mesh(&self) -> TriMesh {
@@ -269,17 +262,6 @@ impl Shape {
     pub fn part_name(&self, part: usize) -> Option<&str> {
         let Shape::Compound(compound) = self else { return None };
         compound.parts().get(part)?.name.as_deref()
-    }
-
-    /// Returns a shape with `link/` before the names of a compound's parts; the same one if they have none.
-    #[must_use]
-    pub fn with_names_in(&self, link: &str) -> Shape {
-        match self {
-            Shape::Compound(compound) if compound.parts().iter().any(|part| part.name.is_some()) => {
-                Shape::Compound(Arc::new(compound.with_names_in(link)))
-            }
-            other => other.clone(),
-        }
     }
 }
 
@@ -403,8 +385,10 @@ impl<'de> Deserialize<'de> for CompoundShape {
                 StoredShape::RoundedBox(half_extents, rounding) => Shape::RoundedBox { half_extents, rounding },
                 StoredShape::RoundedCylinder(core, rounding) => Shape::RoundedCylinder { core, rounding },
             };
-            CompoundPart { shape, pose, density, name }
+            shape.validate()?;
+            Ok(CompoundPart { shape, pose, density, name })
         };
-        CompoundShape::new(stored.into_iter().map(part).collect()).map_err(serde::de::Error::custom)
+        let parts = stored.into_iter().map(part).collect::<Result<Vec<_>, ShapeError>>();
+        parts.and_then(CompoundShape::new).map_err(serde::de::Error::custom)
     }
 }

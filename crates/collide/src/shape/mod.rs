@@ -155,6 +155,26 @@ impl Shape {
         Ok(Shape::Cone { radius, height })
     }
 
+    /// Checks the sizes, which the constructors do too: bytes that were read may be damaged.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for the first size out of its range.
+    pub fn validate(&self) -> Result<(), ShapeError> {
+        match self {
+            Shape::HalfSpace | Shape::Cylinder(_) | Shape::Mesh(_) => Ok(()), // these are checked when they are made
+            Shape::Sphere { radius } => Shape::sphere(*radius).map(drop),
+            Shape::Box { half_extents } => Shape::cuboid(2.0 * half_extents).map(drop),
+            Shape::Capsule { radius, half_length } => Shape::capsule(*radius, 2.0 * half_length).map(drop),
+            Shape::Ellipsoid { half_axes } => Shape::ellipsoid(2.0 * half_axes).map(drop),
+            Shape::Cone { radius, height } => Shape::cone(*radius, *height).map(drop),
+            Shape::RoundedBox { half_extents, rounding } => rounded::check(*rounding, half_extents.min()),
+            Shape::RoundedCylinder { core, rounding } => {
+                rounded::check(*rounding, core.radius().min(core.half_length()) + rounding)
+            }
+            Shape::Compound(compound) => compound.parts().iter().try_for_each(|part| part.shape.validate()),
+        }
+    }
+
     /// Returns a compound of several shapes, moved so that its center of mass is the origin;
     /// [`Shape::center_of_mass`] is its position in the frame of the parts.
     ///

@@ -30,7 +30,7 @@ impl Shape {
         if rounding == 0.0 {
             return Ok(plain);
         }
-        checked(rounding, half_extents.min())?;
+        check(rounding, half_extents.min())?;
         Ok(Shape::RoundedBox { half_extents, rounding })
     }
 
@@ -47,7 +47,7 @@ impl Shape {
         if rounding == 0.0 {
             return Shape::cylinder(radius, length);
         }
-        checked(rounding, radius.min(half_length))?;
+        check(rounding, radius.min(half_length))?;
         let core = CylinderShape::new(radius - rounding, 2.0 * (half_length - rounding))?;
         Ok(Shape::RoundedCylinder { core: Arc::new(core), rounding })
     }
@@ -80,9 +80,9 @@ pub(crate) fn thickened(contact: Contact, a: f64, b: f64) -> Contact {
     }
 }
 
-fn checked(rounding: f64, limit: f64) -> Result<(), ShapeError> {
+pub(super) fn check(rounding: f64, limit: f64) -> Result<(), ShapeError> {
     // the core keeps a thickness, so that its faces have normals
-    if rounding > 0.0 && rounding <= limit * (1.0 - LEAST_CORE) {
+    if rounding > 0.0 && limit.is_finite() && rounding <= limit * (1.0 - LEAST_CORE) {
         Ok(())
     } else {
         Err(ShapeError::Rounding { rounding, limit })

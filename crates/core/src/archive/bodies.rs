@@ -98,7 +98,8 @@ impl RigidRecord {
 /// A shape on a link.
 #[derive(Serialize, Deserialize)]
 struct ColliderRecord {
-    link: Option<usize>,
+    /// Index in the frames of the model.
+    link: usize,
     pose: Pose,
     shape: u32,
     material: Material,
@@ -112,7 +113,7 @@ struct ColliderRecord {
 }
 
 impl ColliderRecord {
-    fn of(link: Option<usize>, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
+    fn of(link: usize, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
         let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way, sensor } =
             collider;
         ColliderRecord {
@@ -130,7 +131,7 @@ impl ColliderRecord {
         }
     }
 
-    fn collider(self, tables: &LoadedTables) -> Result<(Option<usize>, Collider), ArchiveError> {
+    fn collider(self, tables: &LoadedTables) -> Result<(usize, Collider), ArchiveError> {
         let ColliderRecord {
             link,
             pose,
@@ -159,7 +160,8 @@ pub(super) struct ArticulatedRecord {
     model: Model,
     base: Pose,
     colliders: Vec<ColliderRecord>,
-    visuals: Vec<VisualRecord>,
+    /// Each with its link, an index in the frames of the model.
+    visuals: Vec<(usize, VisualRecord)>,
     cameras: Vec<CameraMount>,
     lights: Vec<LightMount>,
     dofs: Vec<DofSettings>,
@@ -177,7 +179,7 @@ impl ArticulatedRecord {
             model: body.model().clone(),
             base: *body.base(),
             colliders: parts.colliders.iter().map(|(link, c)| ColliderRecord::of(*link, c, tables)).collect(),
-            visuals: parts.visuals.iter().map(|visual| VisualRecord::of(visual, tables)).collect(),
+            visuals: parts.visuals.iter().map(|(link, visual)| (*link, VisualRecord::of(visual, tables))).collect(),
             cameras: parts.cameras,
             lights: parts.lights,
             dofs: body.dofs().to_vec(),
@@ -199,7 +201,11 @@ impl ArticulatedRecord {
         body.self_collision = self.self_collision;
         let parts = ArticulatedParts {
             colliders: self.colliders.into_iter().map(|c| c.collider(tables)).collect::<Result<_, _>>()?,
-            visuals: self.visuals.into_iter().map(|v| v.visual(tables)).collect::<Result<_, _>>()?,
+            visuals: self
+                .visuals
+                .into_iter()
+                .map(|(link, v)| Ok((link, v.visual(tables)?)))
+                .collect::<Result<_, ArchiveError>>()?,
             cameras: self.cameras,
             lights: self.lights,
             couplings: self.couplings,

@@ -192,6 +192,7 @@ impl World {
     /// [`solver::NAMES`].
     pub fn from_archive(bytes: &[u8], foreign: &mut MakeObject) -> Result<World, ArchiveError> {
         let archive: Archive = open(HEAD, bytes)?;
+        archive.shapes.iter().try_for_each(Shape::validate).map_err(damaged)?;
         let mut world = World::new(archive.settings).map_err(damaged)?;
         world.set_stepper(stepper(&archive.stepper)?);
         world.set_solver(solver(&archive.solver)?);

@@ -141,7 +141,7 @@ impl LoopJointRecord {
     pub fn loop_joint(self, ids: &[ObjectId]) -> Result<LoopJoint, ArchiveError> {
         let [a, b] = self.sides.map(|(part, frame)| {
             let part = part.map(|(index, part)| (id(ids, index), part));
-            Anchor { part, frame }
+            Anchor { part, frame, link: None }
         });
         let mut joint = LoopJoint::new(self.name, self.kind, a, b).map_err(damaged)?;
         joint.set_transmission(self.transmission).map_err(damaged)?;

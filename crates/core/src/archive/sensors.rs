@@ -9,8 +9,15 @@ use crate::world::view::ObjectId;
 use serde::{Deserialize, Serialize};
 use tumble_collide::Pose;
 
-/// Index of the object of a site, if that still exists, and part, `None` for the world; the frame.
-type Site = (Option<(Option<u32>, usize)>, Pose);
+/// The place of a sensor.
+#[derive(Serialize, Deserialize)]
+struct Site {
+    /// Index of the object, if that still exists, and part; `None` for the world.
+    part: Option<(Option<u32>, usize)>,
+    frame: Pose,
+    /// The link whose shapes are read.
+    link: Option<usize>,
+}
 
 /// The thing that a sensor is fixed to; objects by index.
 #[derive(Serialize, Deserialize)]
@@ -35,11 +42,12 @@ pub(super) struct SensorRecord {
 }
 
 fn site(anchor: &Anchor, indices: &ObjectIndices) -> Site {
-    (anchor.part.map(|(id, part)| (indices.of_id(id), part)), anchor.frame)
+    let part = anchor.part.map(|(id, part)| (indices.of_id(id), part));
+    Site { part, frame: anchor.frame, link: anchor.link }
 }
 
-fn anchor((part, frame): Site, ids: &[ObjectId]) -> Anchor {
-    Anchor { part: part.map(|(index, part)| (id(ids, index), part)), frame }
+fn anchor(Site { part, frame, link }: Site, ids: &[ObjectId]) -> Anchor {
+    Anchor { part: part.map(|(index, part)| (id(ids, index), part)), frame, link }
 }
 
 impl SensorRecord {

@@ -117,6 +117,8 @@ pub struct ArticulatedBody {
     pub(super) base: Pose,
     pub(super) colliders: Vec<LinkCollider>,
     pub(super) visuals: Vec<Visual>,
+    /// The link of each visual, an index in `Model::frames`.
+    pub(super) visual_links: Vec<usize>,
     pub(super) cameras: Vec<CameraMount>,
     pub(super) lights: Vec<LightMount>,
     /// Settings of each degree of freedom, in the order of `v`. May change between steps.
@@ -172,6 +174,7 @@ impl ArticulatedBody {
             base: Pose::identity(),
             colliders: Vec::new(),
             visuals: Vec::new(),
+            visual_links: Vec::new(),
             cameras: Vec::new(),
             lights: Vec::new(),
             dofs,
@@ -234,24 +237,22 @@ impl ArticulatedBody {
     }
 
     /// Adds a shape to the link of that name, which may be a fixed link that is folded into its
-    /// parent. Then its names become `LINK/NAME`, and the shape is one of the parent, or of the first link on the base.
+    /// parent. It moves with the parent then; contacts and events still name the link of the shape.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`]; [`ArticulatedError::Collider`] for a name that another shape of the link has, surface
     /// constants of a part that the shape does not have, and a one-way direction without a length.
     pub fn add_collider(&mut self, link: &str, mut collider: Collider) -> Result<(), ArticulatedError> {
-        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
-        let carrier = frame.link;
-        self.name_within(link, carrier, &mut collider);
-        self.check_collider(carrier, &collider).map_err(|why| ArticulatedError::Collider {
+        let Some(number) = self.model.frame_index(link) else { return Err(self.no_link(link)) };
+        self.check_collider(number, &collider).map_err(|why| ArticulatedError::Collider {
             body: self.name.clone(),
             link: link.into(),
             why,
         })?;
-        let Some(frame) = self.model.frame(link) else { return Err(self.no_link(link)) };
+        let frame = &self.model.frames()[number];
         let center = Translation3::from(collider.shape.center_of_mass());
         collider.pose = frame.pose * (collider.pose * center);
-        self.colliders.push(LinkCollider { link: frame.link, collider });
+        self.colliders.push(LinkCollider { link: frame.link, frame: number, collider });
         Ok(())
     }
 
@@ -262,6 +263,7 @@ impl ArticulatedBody {
     pub fn add_visual(&mut self, link: &str, mut visual: Visual) -> Result<(), ArticulatedError> {
         (visual.part, visual.pose) = self.part_of(link, &visual.pose)?;
         self.visuals.push(visual);
+        self.visual_links.extend(self.model.frame_index(link));
         Ok(())
     }
 
@@ -293,11 +295,13 @@ impl ArticulatedBody {
     }
 
     /// Returns a frame fixed to a link, which may be a fixed one, for a sensor or a loop joint; `id` is this body in a world.
+    /// A touch sensor there reads the contacts of this link's own shapes.
     ///
     /// # Errors
     /// [`ArticulatedError::NoLink`].
     pub fn anchor(&self, id: ObjectId, link: &str, pose: &Pose) -> Result<Anchor, ArticulatedError> {
-        self.part_of(link, pose).map(|(part, frame)| Anchor::on(id, part, frame))
+        let (part, frame) = self.part_of(link, pose)?;
+        Ok(Anchor { link: self.model.frame_index(link), ..Anchor::on(id, part, frame) })
     }
 
     /// Disables collisions between two links. A fixed link stands for the link or base into which
@@ -454,7 +458,16 @@ impl ArticulatedBody {
         if part < links { Some(part) } else { self.collider(part)?.link }
     }
 
-    /// Returns the parts that are colliders of a moving link, or of the base for `None`.
+    /// Returns the link of a part as its user named it: an index in [`Model::frames`]. It is the link that a shape was
+    /// added to, which may be a fixed one. `None` for the base itself.
+    pub fn frame_of(&self, part: usize) -> Option<usize> {
+        match self.model.links().get(part) {
+            Some(link) => self.model.frame_index(&link.name),
+            None => Some(self.collider(part)?.frame),
+        }
+    }
+
+    /// Returns the parts that are colliders of a moving link and of the links fixed to it, or of the base for `None`.
     pub fn colliders_of(&self, link: Option<usize>) -> impl Iterator<Item = usize> {
         let first = self.model.links().len() + 1;
         self.colliders.iter().enumerate().filter(move |(_, part)| part.link == link).map(move |(k, _)| first + k)

@@ -107,6 +107,8 @@ impl Collider {
 pub(super) struct LinkCollider {
     /// Moving link; `None` for the base.
     pub link: Option<usize>,
+    /// Index in [`Model::frames`](super::Model::frames) of the link that it was added to.
+    pub frame: usize,
     /// The collider, with its pose in the frame of the link or base.
     pub collider: Collider,
 }

@@ -47,7 +47,7 @@ impl Object for ArticulatedBody {
             (part_state.bias_angular_acceleration, part_state.bias_acceleration) = accelerations[i];
         }
         rest[0] = PartState { pose: *self.base(), ..PartState::default() };
-        for (part_state, LinkCollider { link, collider }) in rest[1..].iter_mut().zip(&self.colliders) {
+        for (part_state, LinkCollider { link, collider, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
             let carrier = link.map_or(PartState { pose: *self.base(), ..PartState::default() }, |l| moving[l]);
             part_state.pose = carrier.pose * collider.pose;
             let (point, spin) = (part_state.position(), carrier.angular_velocity);
@@ -102,7 +102,7 @@ impl ArticulatedBody {
     fn gather(&self, dynamics: &Dynamics, parts: &[Wrench], links: &mut [Wrench]) {
         let (moving, rest) = parts.split_at(links.len());
         links.copy_from_slice(moving);
-        for (wrench, LinkCollider { link, collider }) in rest[1..].iter().zip(&self.colliders) {
+        for (wrench, LinkCollider { link, collider, .. }) in rest[1..].iter().zip(&self.colliders) {
             let Some(link) = *link else { continue };
             let arm = dynamics.link_pose(link).rotation * collider.pose.translation.vector;
             links[link].force += wrench.force;
@@ -300,6 +300,10 @@ impl Collidable for ArticulatedBody {
         self.collider(part).map_or(&[], |p| p.collider.shape_materials.as_slice())
     }
 
+    fn part_name(&self, part: usize) -> Option<&str> {
+        Some(&self.model().frames().get(self.frame_of(part)?)?.name)
+    }
+
     fn shape_name(&self, part: usize, shape: usize) -> Option<&str> {
         name_of(&self.collider(part)?.collider, shape)
     }
@@ -364,6 +368,11 @@ impl NetSync for ArticulatedBody {
 
 /// Placement of parts.
 impl ArticulatedBody {
+    /// Returns the visuals, each with its link, an index in [`Model::frames`](super::Model::frames), which may be a fixed one.
+    pub fn visuals_of_links(&self) -> impl Iterator<Item = (usize, &Visual)> {
+        self.visual_links.iter().copied().zip(&self.visuals)
+    }
+
     /// Returns the pose of a part's frame in the frame of the link (or base) that carries it.
     pub fn part_pose(&self, part: usize) -> Pose {
         self.collider(part).map_or(Pose::identity(), |p| p.collider.pose)

@@ -1,8 +1,7 @@
 //! The shapes of a link: their numbers, names and surface constants.
 //!
 //! The shapes of a link are numbered over its colliders in the order of their parts, where the parts of a compound count
-//! one by one. Shapes of fixed links belong to the link into which these are folded, and those on the base to the first
-//! link there; their names then begin with the name of their own link, as in `tool/pad`.
+//! one by one. A fixed link has shapes of its own, although they move with the link into which it is folded.
 
 use super::body::{ArticulatedBody, ArticulatedError};
 use super::collider::Collider;
@@ -12,25 +11,26 @@ use crate::rigid::check_shape_name;
 use tumble_collide::{Shape, Vec3};
 
 impl ArticulatedBody {
-    /// Returns the shapes of a moving link, or of the base for `None`, by their numbers: part, index in a compound and name.
-    pub fn shapes_of(&self, link: Option<usize>) -> impl Iterator<Item = (usize, usize, Option<&str>)> {
-        self.colliders_of(link).filter_map(|part| Some((part, self.collider(part)?))).flat_map(|(part, found)| {
+    /// Returns the shapes of a link, an index in [`Model::frames`](super::Model::frames), by their numbers: part, index in a
+    /// compound and name.
+    pub fn shapes_of(&self, link: usize) -> impl Iterator<Item = (usize, usize, Option<&str>)> {
+        let first = self.model.links().len() + 1;
+        let own = self.colliders.iter().enumerate().filter(move |(_, found)| found.frame == link);
+        own.flat_map(move |(k, found)| {
             let collider = &found.collider;
-            (0..collider.shape.part_count()).map(move |shape| (part, shape, name_of(collider, shape)))
+            (0..collider.shape.part_count()).map(move |shape| (first + k, shape, name_of(collider, shape)))
         })
     }
 
     /// Returns the number of a shape on its link, for the part and the index that contacts report.
     pub fn shape_number(&self, part: usize, shape: usize) -> usize {
-        let found = self.shapes_of(self.link_of(part)).position(|(p, s, _)| (p, s) == (part, shape));
-        found.unwrap_or(shape)
+        let own = self.collider(part).map(|found| self.shapes_of(found.frame));
+        own.and_then(|mut own| own.position(|(p, s, _)| (p, s) == (part, shape))).unwrap_or(shape)
     }
 
     /// Returns the part and the index of the shape of that name on a link, which may be a fixed one; `None` without one.
     pub fn shape_named(&self, link: &str, name: &str) -> Option<(usize, usize)> {
-        let carrier = self.model.frame(link)?.link;
-        let full = if self.carries(link, carrier) { name.to_owned() } else { format!("{link}/{name}") };
-        let found = self.shapes_of(carrier).find(|(_, _, own)| *own == Some(&full));
+        let found = self.shapes_of(self.model.frame_index(link)?).find(|(_, _, own)| *own == Some(name));
         found.map(|(part, shape, _)| (part, shape))
     }
 
@@ -52,8 +52,8 @@ impl ArticulatedBody {
         shape: usize,
         material: Option<Material>,
     ) -> Result<(), ArticulatedError> {
-        let carrier = self.link_of(part);
-        let (body, link) = (self.name.clone(), self.carrier_name(carrier).to_owned());
+        let frame = self.frame_of(part).and_then(|frame| self.model.frames().get(frame));
+        let (body, link) = (self.name.clone(), frame.map(|frame| frame.name.clone()).unwrap_or_default());
         let wrong = |why| ArticulatedError::Collider { body, link, why };
         if let Some((what, value, expected)) = material.and_then(|material| material.validate().err()) {
             return Err(wrong(BodyError::Range { what, value, expected }));
@@ -70,36 +70,15 @@ impl ArticulatedBody {
         Ok(())
     }
 
-    /// Returns the name of the link to which the shapes of a moving link, or of the base, are counted.
-    fn carrier_name(&self, carrier: Option<usize>) -> &str {
-        match carrier {
-            Some(link) => &self.model.links()[link].name,
-            None => self.model.frames().iter().find(|frame| frame.link.is_none()).map_or("", |frame| &frame.name),
-        }
-    }
-
-    /// Returns whether the shapes of a link are counted to the link itself.
-    fn carries(&self, link: &str, carrier: Option<usize>) -> bool {
-        self.carrier_name(carrier) == link
-    }
-
-    /// Puts the name of a folded link before the names of its shape.
-    pub(super) fn name_within(&self, link: &str, carrier: Option<usize>, collider: &mut Collider) {
-        if !self.carries(link, carrier) {
-            collider.name.iter_mut().filter(|name| !name.is_empty()).for_each(|name| *name = format!("{link}/{name}"));
-            collider.shape = collider.shape.with_names_in(link);
-        }
-    }
-
-    /// Checks a collider that is added to a moving link, or to the base.
-    pub(super) fn check_collider(&self, carrier: Option<usize>, collider: &Collider) -> Result<(), BodyError> {
+    /// Checks a collider that is added to a link, an index in the model's frames.
+    pub(super) fn check_collider(&self, link: usize, collider: &Collider) -> Result<(), BodyError> {
         if let Some(name) = &collider.name {
             check_shape_name(name, &collider.shape)?;
         }
         let count = collider.shape.part_count();
-        let before = self.shapes_of(carrier).count();
+        let before = self.shapes_of(link).count();
         for (shape, name) in (0..count).filter_map(|shape| Some((shape, name_of(collider, shape)?))) {
-            if let Some(first) = self.shapes_of(carrier).position(|(_, _, own)| own == Some(name)) {
+            if let Some(first) = self.shapes_of(link).position(|(_, _, own)| own == Some(name)) {
                 return Err(BodyError::ShapeNames { first, second: before + shape, name: name.into() });
             }
         }

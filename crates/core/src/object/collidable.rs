@@ -68,6 +68,11 @@ pub trait Collidable {
         let _ = part;
         &[]
     }
+    /// Returns the name of a part: that of the link whose shape it is, as its user named the link. None by default.
+    fn part_name(&self, part: usize) -> Option<&str> {
+        let _ = part;
+        None
+    }
     /// Returns the name of a shape of a part, which contacts report by its index: a compound's part, or 0. None by
     /// default, except for parts of a compound with names.
     fn shape_name(&self, part: usize, shape: usize) -> Option<&str> {

@@ -117,12 +117,20 @@ impl Sensor {
         core.distance_along(&ray, |id, part| core.carries(site, id, part)).unwrap_or(-1.0)
     }
 
-    /// Returns the impulse along the normals of the contacts of the site's link or body, within the volume if there is one, N·s.
+    /// Returns the impulse along the normals of the contacts of the site's body, or of the shapes of its link alone, within the
+    /// volume if there is one, N·s.
     fn touch(&self, core: &Core, site: &Anchor, [start, end]: [&Pose; 2]) -> Option<f64> {
         let (id, part) = site.part?;
+        let any: &dyn std::any::Any = core.objects().get(id)?.object;
+        let body = any.downcast_ref::<ArticulatedBody>();
+        let link = body.and_then(|body| site.link.or_else(|| body.frame_of(part)));
         let mine = |row: u32| {
             let owner = core.owners[row as usize];
-            owner.id == id && core.carrier(id, owner.part as usize) == core.carrier(id, part)
+            let own = |body: &ArticulatedBody| match link {
+                Some(link) => body.frame_of(owner.part as usize) == Some(link),
+                None => body.link_of(owner.part as usize).is_none(), // all shapes on the base
+            };
+            owner.id == id && body.is_none_or(own)
         };
         let middle = Pose::from_parts(
             (0.5 * (start.translation.vector + end.translation.vector)).into(),

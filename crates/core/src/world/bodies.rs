@@ -27,6 +27,12 @@ impl World {
         self.object(id)?.collidable()?.shape_name(part, shape)
     }
 
+    /// Returns the name of the link of a part as contacts, hits and events report it: the link to which the shape was added, also
+    /// if it is a fixed one. `None` for rigid bodies, for a base without shapes and for a removed object.
+    pub fn part_name(&self, id: ObjectId, part: usize) -> Option<&str> {
+        self.object(id)?.collidable()?.part_name(part)
+    }
+
     /// Returns an object by id, as its own type; `None` if it was removed or has another type.
     pub fn get<T: Object>(&self, id: ObjectId) -> Option<&T> {
         let object: &dyn std::any::Any = self.object(id)?;

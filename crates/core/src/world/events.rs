@@ -86,6 +86,17 @@ impl Event {
         Event { kind, a, part_a: 0, shape_a: 0, b, part_b: 0, shape_b: 0, impulse: zero, point: zero }
     }
 
+    /// Returns whether it is of two parts: a contact, or a part in a sensor.
+    pub fn is_of_parts(&self) -> bool {
+        use EventKind::{ContactBegin, ContactEnd, ContactPersist, SensorBegin, SensorEnd};
+        matches!(self.kind, ContactBegin | ContactPersist | ContactEnd | SensorBegin | SensorEnd)
+    }
+
+    /// Returns whether it knows the shapes that touch: a contact that begins or persists.
+    pub fn has_shapes(&self) -> bool {
+        matches!(self.kind, EventKind::ContactBegin | EventKind::ContactPersist)
+    }
+
     /// Returns whether an object takes part.
     pub(crate) fn names(&self, id: ObjectId) -> bool {
         self.a == id || self.b == Some(id)

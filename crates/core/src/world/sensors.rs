@@ -62,6 +62,11 @@ impl World {
                         return Err(WorldError::NoPart { name, part });
                     }
                 }
+                if let Some(link) = anchor.link
+                    && anchor.part.and_then(|(id, _)| body(id)?.model().frames().get(link)).is_none()
+                {
+                    return wrong(format!("it reads the link number {link}, which the body does not have"));
+                }
                 let link = anchor.part.and_then(|(id, part)| body(id)?.link_of(part));
                 if sensor.kind().reads_joint() && link.is_none() {
                     return wrong("the force and torque of a joint are read at a link of an articulated body that a joint moves, or at a loop joint".into());

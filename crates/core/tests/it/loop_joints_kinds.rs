@@ -457,6 +457,21 @@ fn wrong_settings_are_named() {
         (of(joint(LoopJointKind::Revolute).with_length(1.0)), "a revolute joint has no length"),
         (of(joint(LoopJointKind::Rope).with_length(-1.0)), "the length is -1; it must be finite and at least 0"),
         (of(joint(LoopJointKind::Revolute).with_limits([1.0, 0.0])), "the lower limit is 1"),
+        // the joint is 1 m long
+        (
+            of(joint(LoopJointKind::Distance).with_limits([2.0, 3.0])),
+            "the lower limit of its length is 2; it must be at",
+        ),
+        (
+            of(joint(LoopJointKind::Distance).with_limits([0.0, 0.5])),
+            "the upper limit of its length is 0.5; it must be at",
+        ),
+        (of(joint(LoopJointKind::Rope).with_limits([1.5, 3.0])), "at most the length of the joint"),
+        (of(joint(LoopJointKind::Spring).with_limits([-2.0, -1.0])), "the upper limit of its length is -1"),
+        (
+            of(joint(LoopJointKind::Distance).with_limits([0.0, 1.0]).unwrap().with_length(1.5)),
+            "the upper limit of its",
+        ),
         (of(joint(LoopJointKind::Revolute).with_limits([-4.0, 4.0])), "the range of its limits is 8"),
         (of(joint(LoopJointKind::Fixed).with_breaking_force(0.0)), "the breaking force is 0; it must be above 0"),
         (of(joint(LoopJointKind::Fixed).with_breaking_torque(f64::NAN)), "the breaking torque is NaN"),

@@ -211,6 +211,54 @@ fn sensors_partings_keys_and_broken_joints_fire_once_each() {
     }
 }
 
+/// A block rests and falls asleep after half a second; a ball that falls 4 m wakes it.
+#[test]
+fn lasting_contacts_sleep_and_waking_fire() {
+    for stepper in STEPPERS {
+        let sleep = Some(Sleep { after: 0.5, within: 1e-3 });
+        let mut world = World::new(Settings::default().with_dt(1.0 / 240.0).with_sleep(sleep)).unwrap();
+        world.set_stepper(stepper_by_name(stepper).unwrap());
+        let floor = ground(&mut world, 0.0, 0.5);
+        let cube = RigidBody::new(Shape::cuboid(Vec3::repeat(0.4)).unwrap()).with_mass(10.0).with_name("block");
+        let block = world.add(cube.with_pose(Pose::translation(0.0, 0.0, 0.2))).unwrap();
+        let dropped = world.add(ball("ball", [0.0, 0.0, 4.5])).unwrap();
+        let triggers = [
+            ("meets", Trigger::Contact { a: vec![floor], b: vec![block], impulse: 0.0 }),
+            ("lasts", Trigger::Touching { a: vec![block], b: vec![floor] }),
+            ("sleeps", Trigger::Asleep { bodies: vec![block] }),
+            ("wakes", Trigger::Awake { bodies: Vec::new() }),
+            ("never", Trigger::Asleep { bodies: vec![floor] }),
+        ];
+        let ids = triggers.map(|(name, t)| world.add(ScriptedEvent::new(name, t)).unwrap());
+        let mut times = ids.map(|_| Vec::<i32>::new());
+        for frame in 1..=250 {
+            world.step().unwrap();
+            let lasts = |e: &&Event| e.kind == EventKind::ContactPersist && (e.a, e.b) == (floor, Some(block));
+            let expected = world.events().iter().filter(lasts).count();
+            for (event, times) in ids.iter().zip(&mut times) {
+                let firings: Vec<Event> =
+                    world.events().iter().filter(|e| e.kind == EventKind::Fired && e.a == *event).copied().collect();
+                if *event == ids[1] {
+                    assert_eq!(firings.len(), expected, "frame {frame}");
+                    assert!(firings.iter().all(|e| e.b == Some(floor)));
+                } else {
+                    assert!(firings.iter().all(|e| e.b == Some(block)), "frame {frame}: {firings:?}");
+                }
+                times.extend(firings.iter().map(|_| frame));
+            }
+        }
+        let hit = ((2.0 * (4.5 - 0.1 - 0.4) / G).sqrt() * 240.0_f64).ceil() as i32; // the frame in which the ball arrives
+        let [meets, lasts, sleeps, wakes, never] = &times;
+        assert_eq!((meets.len(), sleeps.len(), never.len()), (1, 1, 0), "{stepper}: {times:?}");
+        assert_eq!(lasts[0], meets[0] + 1);
+        assert!((sleeps[0] - 120).abs() <= 2 && (wakes[0] - hit).abs() <= 1 && wakes.len() == 1, "{hit}: {times:?}");
+        // every frame up to sleep, none during it
+        assert_eq!(lasts.iter().filter(|frame| **frame <= wakes[0] - 1).count() as i32, sleeps[0] - meets[0]);
+        assert!(!lasts.iter().any(|frame| (sleeps[0] + 1..wakes[0]).contains(frame)));
+        let _ = dropped;
+    }
+}
+
 #[test]
 fn an_event_after_an_event_waits_for_its_delay() {
     let mut world = no_gravity(world("time_stepping", 0.01));

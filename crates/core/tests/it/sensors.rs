@@ -1,8 +1,10 @@
 //! Measuring sensors against closed forms.
 
+use tumble_core::collide::Mat3;
 use tumble_core::prelude::*;
 use tumble_core::{
-    Anchor, DofSettings, Drive, JointPlace, LoopJointKind, Sensor, SensorKind, Settings, stepper_by_name,
+    Anchor, ArticulatedBody, ArticulationBuilder, Collider, DofSettings, Drive, EventKind, Joint, JointPlace,
+    LinkBuilder, LinkMass, LoopJointKind, Sensor, SensorKind, Settings, stepper_by_name,
 };
 
 const G: f64 = 9.81;
@@ -342,6 +344,71 @@ fn velocities_and_accelerations_are_the_differences_of_poses() {
         for k in 0..3 {
             let order = (pair[0][k] / pair[1][k]).log2();
             assert!((order - 2.0).abs() < 0.2, "{k}: order {order} of {errors:?}");
+        }
+    }
+}
+
+/// A leg: the calf has one shape and the foot, which a fixed joint holds on it 1 m aside, has two, at 1 m and at 2 m. Each link
+/// weighs 2 kg.
+fn leg(joint: Joint) -> ArticulatedBody {
+    let mass = LinkMass { mass: 2.0, center: Vec3::zeros(), inertia: Mat3::identity() };
+    let ball = |x: f64| Collider::new(Shape::sphere(0.1).unwrap(), Pose::translation(x, 0.0, 0.0));
+    let calf = LinkBuilder::new("calf", joint).with_pose(Pose::translation(0.0, 0.0, 0.1));
+    let calf = calf.with_mass_properties(mass).with_collider(ball(0.0).with_name("knee"));
+    let foot = LinkBuilder::new("foot", Joint::Fixed).with_parent("calf").with_mass_properties(mass);
+    let foot = foot.with_pose(Pose::translation(1.0, 0.0, 0.0)).with_collider(ball(0.0).with_name("heel"));
+    ArticulationBuilder::new("leg").link(calf).link(foot.with_collider(ball(1.0).with_name("toe"))).build().unwrap()
+}
+
+#[test]
+fn touch_sensors_and_events_tell_a_fixed_foot_from_the_calf_that_carries_it() {
+    let slides = Joint::prismatic(Vec3::z());
+    // the height of the pads decides which shapes touch: -0.5 is out of reach. A free leg rests on two of them by the law of
+    // the lever: its center of mass is at 0.5 m
+    for (joint, heights, touched, forces) in [
+        (slides, [0.0, -0.5, -0.5], vec![("calf", "knee")], [4.0 * G, 0.0]),
+        (slides, [-0.5, 0.0, -0.5], vec![("foot", "heel")], [0.0, 4.0 * G]),
+        (slides, [-0.5, -0.5, 0.0], vec![("foot", "toe")], [0.0, 4.0 * G]),
+        (Joint::Floating, [0.0, -0.5, 0.0], vec![("calf", "knee"), ("foot", "toe")], [3.0 * G, G]),
+        (Joint::Floating, [0.0, 0.0, -0.5], vec![("calf", "knee"), ("foot", "heel")], [2.0 * G, 2.0 * G]),
+    ] {
+        for stepper in STEPPERS {
+            let mut world = world(stepper, 1.0 / 240.0);
+            let leg = world.add(leg(joint)).unwrap();
+            for (x, height) in heights.into_iter().enumerate() {
+                let pad = Shape::cuboid(Vec3::new(0.5, 0.5, 0.2)).unwrap();
+                let at = Pose::translation(x as f64, 0.0, height - 0.1);
+                world.add_static(RigidBody::fixed(pad).with_pose(at)).unwrap();
+            }
+            let named = |world: &World, link: &str| {
+                world.get::<ArticulatedBody>(leg).unwrap().anchor(leg, link, &Pose::identity()).unwrap()
+            };
+            let [calf, foot] = ["calf", "foot"].map(|link| {
+                let at = named(&world, link);
+                sensor(&mut world, SensorKind::Touch, at)
+            });
+            let by_part = sensor(&mut world, SensorKind::Touch, site(leg, 0, [0.0; 3]));
+            steps(&mut world, 60);
+            let again = World::from_archive(&world.archive(&[]).unwrap(), &mut |_| None).unwrap();
+            for mut world in [world, again] {
+                steps(&mut world, 1);
+                let read = |name: usize| world.reading(world.sensors().nth(name).unwrap()).unwrap()[0];
+                close(Vec3::new(read(0), read(1), 0.0), [forces[0], forces[1], 0.0], 1e-6, stepper);
+                assert_eq!(read(2), read(0), "a part without a name of a link is that of the moving link");
+                let leg = world.find("leg").unwrap();
+                let mut names: Vec<_> = world
+                    .events()
+                    .iter()
+                    .filter(|event| event.kind == EventKind::ContactPersist)
+                    .map(|e| {
+                        let name = world.shape_name(leg, e.part_a, e.shape_a).unwrap();
+                        (world.part_name(leg, e.part_a).unwrap(), name)
+                    })
+                    .collect();
+                names.sort_unstable();
+                assert_eq!(names, touched);
+            }
+            let _ = (calf, foot, by_part);
         }
     }
 }

@@ -120,17 +120,19 @@ fn arm() -> ArticulationBuilder {
 }
 
 #[test]
-fn shapes_of_fixed_links_have_the_names_of_their_links_in_front() {
+fn fixed_links_have_shapes_of_their_own() {
     let body = arm().build().unwrap();
-    let names = |link| body.shapes_of(link).map(|(_, _, name)| name.unwrap_or("")).collect::<Vec<_>>();
-    assert_eq!(names(None), ["pad", "plate/pad"]);
-    assert_eq!(names(Some(0)), ["pad", "", "hand/pad", "hand/inner", ""]);
-    for (link, name, number) in
-        [("base", "pad", 0), ("plate", "pad", 1), ("upper", "pad", 0), ("hand", "inner", 3), ("upper", "hand/pad", 2)]
-    {
+    let frame = |link: &str| body.model().frame_index(link).unwrap();
+    let names = |link: &str| body.shapes_of(frame(link)).map(|(_, _, name)| name.unwrap_or("")).collect::<Vec<_>>();
+    assert_eq!(["base", "plate", "upper"].map(names), [vec!["pad"], vec!["pad"], vec!["pad", ""]]);
+    assert_eq!(names("hand"), ["pad", "inner", ""]);
+    for (link, name, number) in [("base", "pad", 0), ("plate", "pad", 0), ("upper", "pad", 0), ("hand", "inner", 1)] {
         let (part, shape) = body.shape_named(link, name).unwrap();
         assert_eq!(body.shape_number(part, shape), number, "{link} {name}");
+        assert_eq!(body.frame_of(part), Some(frame(link)));
     }
+    // parts: the moving link, the base, then the shapes
+    assert_eq!([0, 1].map(|part| body.frame_of(part)), [Some(frame("upper")), None]);
     assert_eq!(body.shape_named("upper", "inner"), None);
     assert_eq!(body.shape_named("nothing", "pad"), None);
     let mut world = World::default();
@@ -139,8 +141,10 @@ fn shapes_of_fixed_links_have_the_names_of_their_links_in_front() {
     let ray = Ray { origin: Vec3::new(3.5, 0.0, 5.0), direction: -Vec3::z(), max_distance: 9.0 };
     for world in [&world, &again] {
         let hit = world.cast_rays(&[ray], &QueryFilter::default())[0].unwrap();
-        assert_eq!((hit.id, world.shape_name(hit.id, hit.part, hit.shape)), (id, Some("hand/inner")));
+        assert_eq!((hit.id, world.shape_name(hit.id, hit.part, hit.shape)), (id, Some("inner")));
+        assert_eq!(world.part_name(hit.id, hit.part), Some("hand"));
     }
+    assert_eq!(again.part_name(again.find("arm").unwrap(), 1), None);
     assert_eq!(world.shape_name(ObjectId::default(), 0, 0), None);
 }
 
@@ -158,7 +162,7 @@ fn a_name_that_occurs_twice_is_an_error_with_both_places() {
     };
     assert_eq!(
         error(extra("pad")),
-        "articulated body 'arm', link 'more': shapes 5 and 6 are both named 'more/pad'; give the shapes of one body or link different names"
+        "articulated body 'arm', link 'more': shapes 0 and 1 are both named 'pad'; give the shapes of one body or link different names"
     );
     assert!(error(extra("")).contains("the name of a shape is ''"));
     let whole = Shape::compound(vec![ball(0.0), ball(1.0)]).unwrap();

@@ -3,7 +3,7 @@
 //! | topic | message |
 //! |---|---|
 //! | `/tumble/sensors` | an object with an array of numbers for each sensor: `{"imu": [0, 0, 9.81]}` |
-//! | `/tumble/events` | `{"events": [{"kind": "contact_begin", "a": "ground", "b": "ball", "shapes": [0, 0], "impulse": [0, 0, -1], "point": [0, 0, 0]}]}` |
+//! | `/tumble/events` | `{"events": [{"kind": "contact_begin", "a": "ground", "b": "leg/foot", "bodies": ["ground", "leg"], "links": [null, "foot"], "shapes": [0, 0], "shape_names": [null, "sole"], "impulse": [0, 0, -1], "point": [0, 0, 0]}]}` |
 //!
 //! A frame without any has no message. Both come before the state message of their frame and have its log time. Readers of
 //! earlier versions skip them.
@@ -29,7 +29,7 @@ const JSON_SCHEMA: &str = "jsonschema";
 pub const MAX_EVENTS: usize = 4096;
 
 const SENSORS_TEXT: &str = r#"{"title": "tumble.Sensors", "type": "object", "additionalProperties": {"type": "array", "items": {"type": "number"}}}"#;
-const EVENTS_TEXT: &str = r#"{"title": "tumble.Events", "type": "object", "properties": {"events": {"type": "array", "items": {"type": "object", "properties": {"kind": {"type": "string"}, "a": {"type": "string"}, "b": {"type": "string"}, "shapes": {"type": "array", "items": {"type": "integer"}}, "impulse": {"type": "array", "items": {"type": "number"}}, "point": {"type": "array", "items": {"type": "number"}}}}}}}"#;
+const EVENTS_TEXT: &str = r#"{"title": "tumble.Events", "type": "object", "properties": {"events": {"type": "array", "items": {"type": "object", "properties": {"kind": {"type": "string"}, "a": {"type": "string"}, "b": {"type": "string"}, "bodies": {"type": "array", "items": {"type": ["string", "null"]}}, "links": {"type": "array", "items": {"type": ["string", "null"]}}, "shapes": {"type": "array", "items": {"type": "integer"}}, "shape_names": {"type": "array", "items": {"type": ["string", "null"]}}, "impulse": {"type": "array", "items": {"type": "number"}}, "point": {"type": "array", "items": {"type": "number"}}}}}}}"#;
 
 /// Readings of sensors by their names.
 pub type Readings = BTreeMap<String, Vec<f64>>;
@@ -39,13 +39,21 @@ pub type Readings = BTreeMap<String, Vec<f64>>;
 pub struct RecordedEvent {
     /// Name of its kind, such as `contact_begin`.
     pub kind: String,
-    /// Name of the entity, or of the joint that broke.
+    /// Name of the entity, a body or a link as `BODY/LINK`; for all but contacts and sensors that of the body, joint or
+    /// scripted event.
     pub a: String,
-    /// Name of the other entity, if there is one.
+    /// Name of the other entity, or of the body that made an event fire, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub b: Option<String>,
-    /// Shapes of `a` and `b` at the point: indices of the parts of compounds, else 0.
+    /// Names of the bodies of `a` and `b`, without links; for a joint or scripted event its name.
+    pub bodies: [Option<String>; 2],
+    /// Names of the links of articulated bodies, fixed ones too; `None` for other bodies.
+    pub links: [Option<String>; 2],
+    /// Shapes of `a` and `b` at the point: their numbers among the shapes of the link, where the parts of a compound count one
+    /// by one; of other bodies the part of a compound, else 0.
     pub shapes: [u32; 2],
+    /// Names of these shapes; `None` for those without one, and for all but contacts that begin or persist.
+    pub shape_names: [Option<String>; 2],
     /// Impulse on `a` over the frame, N·s, world axes.
     pub impulse: [f64; 3],
     /// Point, world axes, m.

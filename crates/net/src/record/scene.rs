@@ -123,7 +123,8 @@ pub struct Contact {
     pub a: u32,
     /// Index of the entity that the normal points from.
     pub b: u32,
-    /// Shapes of `a` and `b` that touch: indices of the parts of compounds, 0 for all other shapes.
+    /// Shapes of `a` and `b` that touch: their numbers among the shapes of the link, where the parts of a compound count one by
+    /// one; of other bodies the part of a compound, else 0.
     pub shapes: [u32; 2],
     /// Contact point, m.
     pub point: [f64; 3],

@@ -36,7 +36,7 @@ pub(crate) const PROTOBUF: &str = "protobuf";
 /// Name of the metadata record that marks a recording of tumble.
 pub(crate) const METADATA_NAME: &str = "tumble";
 /// Version of the recording's layout.
-pub(crate) const VERSION: u32 = 4;
+pub(crate) const VERSION: u32 = 5;
 
 /// The state message, as text. Every file contains it twice: compiled, as the channel's schema, and
 /// as this text.
@@ -49,7 +49,7 @@ package tumble;
 
 // One frame of a simulation. The schema's name takes the place of a magic number.
 message State {
-  fixed32 version = 1;  // layout of this message: 4
+  fixed32 version = 1;  // layout of this message: 5
   fixed64 frame = 2;    // frame number, strictly increasing within a file
   double time_s = 3;    // simulated time in seconds from 0, not rounded; the log time is this in whole nanoseconds
   bytes payload = 4;    // the state, opaque here; little-endian

@@ -33,7 +33,7 @@ fn chunk(size: u64, compression: &str, stored: &[u8]) -> Vec<u8> {
 }
 
 fn description() -> Vec<u8> {
-    let entries = [sized(b"version"), sized(b"4"), sized(b"world"), sized(b"trap")].concat();
+    let entries = [sized(b"version"), sized(b"5"), sized(b"world"), sized(b"trap")].concat();
     whole(0x0c, &[sized(b"tumble"), sized(&entries)].concat())
 }
 

@@ -8,6 +8,7 @@ mod fuzz;
 mod hostile;
 mod inputs;
 mod kill;
+mod links;
 mod mesh_frame;
 mod outside;
 mod recover;

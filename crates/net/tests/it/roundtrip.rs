@@ -152,7 +152,10 @@ fn readings_and_events_come_back_with_their_frames() {
         kind: "contact_begin".into(),
         a: "ball".into(),
         b: (k == 3).then(|| "ground".into()),
+        bodies: [Some("ball".into()), (k == 3).then(|| "ground".into())],
+        links: [None, Some("plate".into())],
         shapes: [k as u32, 7],
+        shape_names: [Some("rind".into()), None],
         impulse: [0.0, 0.0, k as f64],
         point: [1.0 / 3.0, 0.0, 0.0],
     };

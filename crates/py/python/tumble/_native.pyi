@@ -839,6 +839,9 @@ class Trigger:
         two parts in a frame reaches it, in a lasting contact too. The body of b is the *other* one of the event.
         """
     @staticmethod
+    def touching(a: _Several, b: _Several | None = None) -> Trigger:
+        """A body of a and one of b are in contact, in every step after the one in which they came into contact; not while they sleep."""
+    @staticmethod
     def parting(a: _Several, b: _Several | None = None) -> Trigger:
         """A body of a and one of b part."""
     @staticmethod
@@ -847,6 +850,12 @@ class Trigger:
     @staticmethod
     def leaves(sensor: _Object, bodies: _Several | None = None) -> Trigger:
         """A body leaves a sensor."""
+    @staticmethod
+    def asleep(bodies: _Several | None = None) -> Trigger:
+        """A body falls asleep; without bodies any one counts. It is the *other* body of the event."""
+    @staticmethod
+    def awake(bodies: _Several | None = None) -> Trigger:
+        """A body wakes in a step, not between two steps; without bodies any one counts. It is the *other* body of the event."""
     @staticmethod
     def broken(joint: _Object) -> Trigger:
         """A joint of ``World.add_joint`` breaks."""
@@ -1662,13 +1671,10 @@ class Articulation:
         """Names of the shapes that collide, by links as in ``link_names`` and by the numbers that contacts and hits report;
         None for those without one.
 
-        A fixed link has none: its shapes are those of the link that carries it, named ``link/name``, and those of links
-        fixed to the base are shapes of the first one.
+        A fixed link has its own shapes, although it moves with the link that carries it.
         """
     def shape_number(self, link: str, name: str) -> int:
-        """Returns the number of the shape of that name on a link, which may be a fixed one; that of contacts with the link, or
-        with the link that carries it.
-        """
+        """Returns the number of the shape of that name on a link, which may be a fixed one; that of contacts with the link."""
     def shape_material(self, link: str, shape: int | str) -> dict[str, Any]:
         """Returns the surface constants of one shape of a link: a dict by the names of ``set_shape_material``.
 
@@ -2571,14 +2577,14 @@ class World:
     @property
     def events(self) -> list[Event]:
         """The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
-        ``impulse``, ``point``, ``shapes``, ``shape_names``.
+        ``impulse``, ``point``, ``shapes``, ``shape_names``, ``links``.
 
         kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
         ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
         of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
         ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
         acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes. shapes, shape_names: the shapes
-        that touch there, as in ``contacts``, and their names.
+        that touch there, as in ``contacts``, and their names. links: names of the touched links, fixed ones too.
 
         Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
         at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact

@@ -27,15 +27,21 @@ class RecordedEvent(NamedTuple):
     kind: str
     """Kind of the event."""
     a: str
-    """Name of the body, as in ``Recording.names``, or of the joint."""
+    """Name of the body or link, as in ``Recording.names``; for sleep that of the body, else of the joint or scripted event."""
     b: str | None
-    """Name of the other body; None for sleep and joints."""
+    """Name of the other body or link; None for sleep and joints."""
     impulse: tuple[float, float, float]
     """Impulse on ``a`` over the step, N·s."""
     point: tuple[float, float, float]
     """Point with the largest impulse, m."""
     shapes: tuple[int, int]
-    """Numbers of the shapes at the point: indices of the parts of compounds, 0 for all other shapes."""
+    """Numbers of the shapes at the point, as in ``World.contacts``."""
+    shape_names: tuple[str | None, str | None]
+    """Names of these shapes; None for those without one, and for all but contacts that begin or persist."""
+    bodies: tuple[str | None, str | None]
+    """Names of the bodies of ``a`` and ``b``, without links; for a joint or scripted event its name."""
+    links: tuple[str | None, str | None]
+    """Names of the links of articulations, which may be fixed ones; None for other bodies."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -49,7 +55,8 @@ class Recording:
     frames: NDArray[np.int64]
     """Number of each frame, shape (n,)."""
     names: list[str]
-    """Names of the m bodies; a link is ``name/part``."""
+    """Names of the m bodies and links; a link is ``body/link``. A body with a link without a name, or with the full name of another
+    body or link, has the indices in ``link_names`` instead: ``body/3``."""
     positions: NDArray[np.float64]
     """Shape (n, m, 3), m; NaN while a body did not exist."""
     orientations: NDArray[np.float64]
@@ -58,7 +65,7 @@ class Recording:
     """Snapshot of each frame for ``World.restore``."""
     contacts: list[NDArray[np.void]]
     """Contacts of each frame whose surfaces touch, at most 4096, those with the largest forces: a structured array with ``bodies`` (2,),
-    indices in ``names``; ``shapes`` (2,), indices of the parts of compounds, else 0; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
+    indices in ``names``; ``shapes`` (2,), numbers as in ``World.contacts``; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
     sensors: dict[str, NDArray[np.float64]]
     """Readings of each measuring sensor by its name, shape (n, k); NaN while it did not exist."""
     events: list[list[RecordedEvent]]
@@ -138,7 +145,7 @@ def read(path: str | PathLike[str]) -> Recording:
     arrays = read_recording(path)
     arrays["contacts"] = [np.frombuffer(contacts, _CONTACT) for contacts in arrays["contacts"]]
     arrays["events"] = [
-        [RecordedEvent(kind, a, b, tuple(impulse), tuple(point), shapes) for kind, a, b, impulse, point, shapes in events] for events in arrays["events"]
+        [RecordedEvent(kind, a, b, tuple(impulse), tuple(point), *names) for kind, a, b, impulse, point, *names in events] for events in arrays["events"]
     ]
     return Recording(**arrays)
 

@@ -54,7 +54,7 @@ class Event(NamedTuple):
     b: RigidBody | Articulation | None
     """The other body; None for sleep and joints."""
     parts: tuple[int, int]
-    """For articulations the indices of the links in their ``link_names``, else 0."""
+    """For articulations the indices of the touched links in their ``link_names``, which may be fixed ones, else 0."""
     impulse: NDArray[np.float64]
     """Impulse on ``a`` over the step, world axes, shape (3,), N·s; zero for all but contacts that begin or persist."""
     point: NDArray[np.float64]
@@ -63,6 +63,8 @@ class Event(NamedTuple):
     """The numbers of the shapes that touch at the point, as in ``World.contacts``; 0 like the impulse."""
     shape_names: tuple[str | None, str | None]
     """The names of these shapes; None for those without one, and without an impulse."""
+    links: tuple[str | None, str | None]
+    """The names of the touched links of articulations, which may be fixed ones; None for other bodies."""
 
 
 class Firing(NamedTuple):
@@ -71,7 +73,7 @@ class Firing(NamedTuple):
     event: str
     """Name of the event."""
     other: str | None
-    """Name of the body that made it fire: the visitor of a sensor, or the second side of a contact."""
+    """Name of the body that made it fire: the visitor of a sensor, the second side of a contact, or the one that fell asleep or woke."""
     time: float
     """Simulated time, s."""
     impulse: NDArray[np.float64]

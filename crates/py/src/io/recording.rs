@@ -245,8 +245,12 @@ pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<
         sensors.set_item(name, PyArray1::from_vec(py, column).reshape([frames, length])?)?;
     }
     dict.set_item("sensors", sensors)?;
-    let event =
-        |e: &RecordedEvent| (e.kind.clone(), e.a.clone(), e.b.clone(), e.impulse, e.point, (e.shapes[0], e.shapes[1]));
+    let event = |e: &RecordedEvent| {
+        let pair = |[a, b]: &[Option<String>; 2]| (a.clone(), b.clone());
+        let (shapes, names) = ((e.shapes[0], e.shapes[1]), pair(&e.shape_names));
+        let (bodies, links) = (pair(&e.bodies), pair(&e.links));
+        (e.kind.clone(), e.a.clone(), e.b.clone(), e.impulse, e.point, shapes, names, bodies, links)
+    };
     let events: Vec<Vec<_>> = all.events.iter().map(|events| events.iter().map(event).collect()).collect();
     dict.set_item("events", events)?;
     dict.set_item("world", world)?;
@@ -280,7 +284,11 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         let contacts = named_contacts(&frame.contacts, &columns);
         all.bytes += frame.state.len() + contacts.len();
         all.bytes += frame.sensors.values().map(|reading| 8 * reading.len()).sum::<usize>();
-        all.bytes += frame.events.iter().map(|event| size_of_val(event) + event.a.len()).sum::<usize>();
+        let names = |e: &RecordedEvent| {
+            let sides = [&e.bodies, &e.links, &e.shape_names];
+            e.a.len() + sides.into_iter().flatten().flatten().map(String::len).sum::<usize>()
+        };
+        all.bytes += frame.events.iter().map(|event| size_of_val(event) + names(event)).sum::<usize>();
         let new = frame.sensors.iter().filter(|(name, _)| !all.sensors.contains_key(*name));
         all.width += new.map(|(_, reading)| reading.len()).sum::<usize>();
         let columns_of = all.names.len() * 7 + all.width;

@@ -8,7 +8,6 @@
 //! | title, size and views in postcard; a NetSync snapshot; a NetSync state | any |
 
 use crate::errors::{Error, Result};
-use crate::io::orbit::Orbit;
 use crate::world::class::World;
 use crate::world::pickling::SceneRecord;
 use pyo3::prelude::*;
@@ -21,11 +20,8 @@ use std::time::{Duration, Instant};
 use tumble::dynamics::World as Core;
 use tumble::dynamics::archive::{open, seal};
 use tumble::net::sync::{MAX_CONTACTS, Mirror, Publisher, Viewer};
-use tumble::render::winit::event::{ElementState, WindowEvent};
-use tumble::render::winit::keyboard::{Key, NamedKey};
-use tumble::render::{
-    Camera, DebugDraw, DrawList, Drawing, Next, Quality, Screen, WindowApp, WindowOptions, run_window,
-};
+use tumble::render::winit::event::WindowEvent;
+use tumble::render::{Next, Screen, Viewer as Pictures, WindowApp, WindowOptions, run_window};
 
 const HEAD: &[u8; 8] = b"tumbleW1";
 const HEADER_BYTES: usize = 21;
@@ -185,55 +181,13 @@ impl Shown {
 }
 
 struct App {
-    name: String,
     shown: Arc<Shown>,
-    drawing: Drawing,
-    overlays: DebugDraw,
-    list: Option<DrawList>,
-    /// The camera of the first list.
-    home: Option<Camera>,
-    orbit: Orbit,
-    quality: Quality,
-    stale: bool,
-    ended: bool,
+    pictures: Pictures,
 }
 
 impl App {
     fn new(name: &str, scene: tumble::scene::SceneFile, shown: Arc<Shown>) -> App {
-        App {
-            name: name.into(),
-            shown,
-            drawing: Drawing::new(&scene),
-            overlays: DebugDraw::default(),
-            list: None,
-            home: None,
-            orbit: Orbit::default(),
-            quality: Quality::default(),
-            stale: true,
-            ended: false,
-        }
-    }
-
-    /// Makes the draw list of the newest state.
-    fn update(&mut self, screen: &Screen) -> Result<()> {
-        let mirror = self.shown.mirror();
-        let mut list = self.drawing.list(mirror.world(), &self.overlays)?;
-        screen.window().set_title(&format!("{}  {:.2} s", self.name, mirror.world().time()));
-        drop(mirror);
-        self.quality.apply(&mut list.settings);
-        self.list = Some(list);
-        Ok(())
-    }
-
-    fn key(&mut self, key: &Key) {
-        match key {
-            Key::Named(NamedKey::Home) => self.orbit = Orbit::default(),
-            Key::Named(NamedKey::Escape) => self.ended = true,
-            Key::Character(c) if c == "q" => self.ended = true,
-            Key::Character(c) if c == "c" => self.overlays.contacts = !self.overlays.contacts,
-            _ => return,
-        }
-        self.shown.fresh.store(true, Ordering::Release);
+        App { shown, pictures: Pictures::new(name, &scene) }
     }
 }
 
@@ -241,36 +195,24 @@ impl WindowApp for App {
     type Error = Error;
 
     fn opened(&mut self, screen: &mut Screen) -> Result<()> {
-        self.quality = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.pictures.open(screen);
         Ok(())
     }
 
     fn event(&mut self, screen: &mut Screen, event: &WindowEvent) -> Result<()> {
-        match event {
-            WindowEvent::KeyboardInput { event, .. } if event.state == ElementState::Pressed => {
-                self.key(&event.logical_key);
-            }
-            event => self.stale |= self.orbit.handle(event, screen.size_px()),
-        }
+        self.pictures.handle(screen, event);
         Ok(())
     }
 
     fn turn(&mut self, screen: &mut Screen) -> Result<Next> {
-        if self.ended || self.shown.ended.load(Ordering::Acquire) {
+        if self.pictures.is_closed() || self.shown.ended.load(Ordering::Acquire) {
             return Ok(Next::End);
         }
         let begin = Instant::now();
-        if self.shown.fresh.swap(false, Ordering::AcqRel) {
-            self.update(screen)?;
-            self.stale = true;
+        if self.shown.fresh.swap(false, Ordering::AcqRel) || self.pictures.is_outdated() {
+            self.pictures.update(screen, self.shown.mirror().world())?;
         }
-        if let Some(list) = self.list.as_ref().filter(|_| self.stale) {
-            let camera = self.orbit.camera(self.home.get_or_insert(list.camera));
-            let [width, height] = screen.size_px();
-            screen.renderer().draw(&camera, list, width, height)?;
-            screen.show()?;
-            self.stale = false;
-        }
+        self.pictures.show(screen)?;
         Ok(Next::At(begin + INTERVAL))
     }
 }

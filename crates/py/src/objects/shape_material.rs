@@ -186,9 +186,10 @@ impl Articulation {
             Which::Number(number) => number,
             Which::Name(name) => self.shape_number(link, &name)?,
         };
-        let carrier = self.robot.frame(link)?.link;
+        self.robot.frame(link)?;
         let (found, count) = self.of_body(|body| {
-            let of_link = || body.shapes_of(carrier).map(|(part, shape, _)| (part, shape));
+            let frame = body.model().frame_index(link);
+            let of_link = || frame.into_iter().flat_map(|frame| body.shapes_of(frame)).map(|(part, n, _)| (part, n));
             (of_link().nth(number), of_link().count())
         })?;
         found.ok_or_else(|| Error::value(format!("link '{link}' has no shape {number}; it has {count} that collide")))

@@ -55,33 +55,28 @@ impl Articulation {
     /// Names of the shapes that collide, by links as in ``link_names`` and by the numbers that contacts and hits report;
     /// None for those without one.
     ///
-    /// A fixed link has none: its shapes are those of the link that carries it, named ``link/name``, and those of links
-    /// fixed to the base are shapes of the first one.
+    /// A fixed link has its own shapes, although it moves with the link that carries it.
     #[getter]
     fn shape_names(&self) -> Result<Vec<Vec<Option<String>>>> {
         self.of_body(|body| {
             let names = |link| body.shapes_of(link).map(|(_, _, name)| name.map(str::to_owned)).collect();
-            let frames = body.model().frames();
-            let first = frames.iter().position(|frame| frame.link.is_none());
-            let of_frame = |(k, frame): (usize, &tumble::dynamics::articulated::LinkFrame)| match frame.link {
-                Some(link) if body.model().links()[link].name == frame.name => names(Some(link)),
-                None if first == Some(k) => names(None),
-                _ => Vec::new(),
-            };
-            frames.iter().enumerate().map(of_frame).collect()
+            (0..body.model().frames().len()).map(names).collect()
         })
     }
 
-    /// Returns the number of the shape of that name on a link, which may be a fixed one; that of contacts with the link, or
-    /// with the link that carries it.
+    /// Returns the number of the shape of that name on a link, which may be a fixed one; that of contacts with the link.
     pub(super) fn shape_number(&self, link: &str, name: &str) -> Result<usize> {
-        let carrier = self.robot.frame(link)?.link;
+        self.robot.frame(link)?;
         let found = self.of_body(|body| {
             let (part, shape) = body.shape_named(link, name)?;
             Some(body.shape_number(part, shape))
         })?;
-        let known =
-            || self.of_body(|body| body.shapes_of(carrier).filter_map(|(_, _, own)| own.map(str::to_owned)).collect());
+        let known = || {
+            self.of_body(|body| {
+                let shapes = body.model().frame_index(link).map(|link| body.shapes_of(link));
+                shapes.into_iter().flatten().filter_map(|(_, _, own)| own.map(str::to_owned)).collect()
+            })
+        };
         match found {
             Some(number) => Ok(number),
             None => Err(unknown(&format!("link '{link}'"), name, known()?)),

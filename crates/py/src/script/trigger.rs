@@ -38,6 +38,13 @@ impl Trigger {
         Ok(Trigger { law: Law::Contact { a: several(Some(a))?, b: several(b)?, impulse } })
     }
 
+    /// A body of a and one of b are in contact, in every step after the one in which they came into contact; not while they sleep.
+    #[staticmethod]
+    #[pyo3(signature = (a, b=None))]
+    fn touching(a: &Bound<'_, PyAny>, b: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+        Ok(Trigger { law: Law::Touching { a: several(Some(a))?, b: several(b)? } })
+    }
+
     /// A body of a and one of b part.
     #[staticmethod]
     #[pyo3(signature = (a, b=None))]
@@ -57,6 +64,20 @@ impl Trigger {
     #[pyo3(signature = (sensor, bodies=None))]
     fn leaves(sensor: Given, bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
         Ok(Trigger { law: Law::Leaves { sensor, bodies: several(bodies)? } })
+    }
+
+    /// A body falls asleep; without bodies any one counts. It is the *other* body of the event.
+    #[staticmethod]
+    #[pyo3(signature = (bodies=None))]
+    fn asleep(bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+        Ok(Trigger { law: Law::Asleep { bodies: several(bodies)? } })
+    }
+
+    /// A body wakes in a step, not between two steps; without bodies any one counts. It is the *other* body of the event.
+    #[staticmethod]
+    #[pyo3(signature = (bodies=None))]
+    fn awake(bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+        Ok(Trigger { law: Law::Awake { bodies: several(bodies)? } })
     }
 
     /// A joint of ``World.add_joint`` breaks.
@@ -82,6 +103,9 @@ impl Trigger {
             Law::Time { .. } => "<tumble.Trigger: time>",
             Law::Every { .. } => "<tumble.Trigger: every>",
             Law::Contact { .. } => "<tumble.Trigger: contact>",
+            Law::Touching { .. } => "<tumble.Trigger: touching>",
+            Law::Asleep { .. } => "<tumble.Trigger: asleep>",
+            Law::Awake { .. } => "<tumble.Trigger: awake>",
             Law::Parting { .. } => "<tumble.Trigger: parting>",
             Law::Enters { .. } => "<tumble.Trigger: enters>",
             Law::Leaves { .. } => "<tumble.Trigger: leaves>",
@@ -115,6 +139,9 @@ impl Trigger {
             Law::Time { at } => Law::Time { at: *at },
             Law::Every { period, first } => Law::Every { period: *period, first: *first },
             Law::Contact { a, b, impulse } => Law::Contact { a: side(a)?, b: all(b)?, impulse: *impulse },
+            Law::Touching { a, b } => Law::Touching { a: side(a)?, b: all(b)? },
+            Law::Asleep { bodies } => Law::Asleep { bodies: all(bodies)? },
+            Law::Awake { bodies } => Law::Awake { bodies: all(bodies)? },
             Law::Parting { a, b } => Law::Parting { a: side(a)?, b: all(b)? },
             Law::Enters { sensor, bodies } => Law::Enters { sensor: one(sensor)?, bodies: all(bodies)? },
             Law::Leaves { sensor, bodies } => Law::Leaves { sensor: one(sensor)?, bodies: all(bodies)? },

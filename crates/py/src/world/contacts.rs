@@ -48,14 +48,11 @@ pub fn bytes(inner: &Inner) -> Vec<u8> {
     out
 }
 
-/// Returns the index of the touched link in the `link_names` of its articulation. A rigid body has
-/// only one part.
+/// Returns the index of the touched link in the `link_names` of its articulation, which may be a fixed one. A rigid body
+/// has only one part.
 pub fn link(inner: &Inner, id: ObjectId, part: usize) -> i64 {
     let Some(body) = inner.world.get::<ArticulatedBody>(id) else { return part as i64 };
-    let name = body.link_of(part).map(|link| &body.model().links()[link].name);
-    let frames = body.model().frames();
-    // Shapes on the base count as the first link, to which all others are attached.
-    name.and_then(|name| frames.iter().position(|frame| frame.name == *name)).unwrap_or(0) as i64
+    body.frame_of(part).unwrap_or(0) as i64
 }
 
 /// Returns the number of a shape: the index of a compound's part; on a link, its index among the
@@ -81,8 +78,8 @@ pub fn shape_name(inner: &Inner, id: ObjectId, link: usize, number: usize) -> Re
     let frame = frames.get(link).ok_or_else(|| {
         Error::value(format!("part is {link}; it must be an index of the {} links in link_names", frames.len()))
     })?;
-    let found = body.shapes_of(frame.link).nth(number);
-    let (_, _, name) = found.ok_or_else(|| none(&frame.name, body.shapes_of(frame.link).count()))?;
+    let found = body.shapes_of(link).nth(number);
+    let (_, _, name) = found.ok_or_else(|| none(&frame.name, body.shapes_of(link).count()))?;
     Ok(name.map(str::to_owned))
 }
 
@@ -110,12 +107,8 @@ pub fn kind<'py>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
 struct Side {
     link: i64,
     shape: i64,
+    link_name: Option<String>,
     name: Option<String>,
-}
-
-/// Returns whether an event knows the shapes that touch.
-fn touches(kind: EventKind) -> bool {
-    matches!(kind, EventKind::ContactBegin | EventKind::ContactPersist)
 }
 
 /// Returns the events of the last step.
@@ -127,7 +120,8 @@ pub fn events(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
             let side = |id, part, shape| Side {
                 link: link(inner, id, part),
                 shape: shape_number(inner, id, part, shape),
-                name: inner.world.shape_name(id, part, shape).filter(|_| touches(e.kind)).map(str::to_owned),
+                link_name: inner.world.part_name(id, part).filter(|_| e.is_of_parts()).map(str::to_owned),
+                name: inner.world.shape_name(id, part, shape).filter(|_| e.has_shapes()).map(str::to_owned),
             };
             let b_side = e.b.map_or_else(Side::default, |id| side(id, e.part_b, e.shape_b));
             Some((*e, a, b, [side(e.a, e.part_a, e.shape_a), b_side]))
@@ -141,7 +135,8 @@ pub fn events(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Py<PyAny>>> {
         let kind = word(event.kind, EventKind::NAMES);
         let (parts, shapes) = ((first.link, second.link), (first.shape, second.shape));
         let (impulse, point) = (vector(py, &event.impulse), vector(py, &event.point));
-        Ok(class.call1((kind, a, b, parts, impulse, point, shapes, (first.name, second.name)))?.unbind())
+        let (links, shape_names) = ((first.link_name, second.link_name), (first.name, second.name));
+        Ok(class.call1((kind, a, b, parts, impulse, point, shapes, shape_names, links))?.unbind())
     };
     all.into_iter().map(tuple).collect()
 }

@@ -125,15 +125,17 @@ fn anchor(inner: &Inner, target: &Target, site: &Pose) -> Result<Anchor> {
 
 /// Returns the degree of freedom of the joint that moves a link.
 pub fn dof_of(inner: &Inner, target: &Target, argument: &str) -> Result<(ObjectId, usize)> {
-    let none = || {
-        Error::value(format!("{argument}: expected a link that a revolute or prismatic joint moves, or a loop joint"))
+    let name = inner.world.name(target.id).unwrap_or_default();
+    let none = |link: &str| {
+        Error::value(format!(
+            "{argument}: expected a link that a revolute or prismatic joint of its own moves, or a loop joint, got '{name}{link}'"
+        ))
     };
-    let (body, link) = link(inner, target)?.ok_or_else(none)?;
-    let missing =
-        || Error::Name(format!("'{}' has no link named '{link}'", inner.world.name(target.id).unwrap_or_default()));
-    let frame = body.model().frame(link).ok_or_else(missing)?;
-    let moving = frame.link.map(|k| &body.model().links()[k]).filter(|link| link.joint.dof() == 1).ok_or_else(none)?;
-    Ok((target.id, moving.v))
+    let (body, link) = link(inner, target)?.ok_or_else(|| none(""))?;
+    let model = body.model();
+    model.frame(link).ok_or_else(|| Error::Name(format!("'{name}' has no link named '{link}'")))?;
+    let moving = model.link(link).map(|k| &model.links()[k]).filter(|link| link.joint.dof() == 1);
+    Ok((target.id, moving.ok_or_else(|| none(&format!("/{link}")))?.v))
 }
 
 /// Returns the place of the sensor of that name.

@@ -64,8 +64,7 @@ impl SceneFile {
         let spec = &self.articulated[spec];
         let id = world.find(&spec.name)?;
         let body = world.get::<ArticulatedBody>(id)?;
-        let carrier = body.model().frame(&spec.links[link].name)?.link?;
-        let moving = &body.model().links()[carrier];
+        let moving = &body.model().links()[body.model().link(&spec.links[link].name)?];
         (moving.joint.dof() == 1).then_some((id, moving.v))
     }
 }

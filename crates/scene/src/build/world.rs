@@ -113,6 +113,7 @@ impl SceneFile {
             let [a, b] = [(a, spec.a), (b, spec.b)].map(|(part, named)| Anchor {
                 part,
                 frame: named.map_or_else(Pose::identity, |named| self.frame_in_part(world, &named)),
+                link: None,
             });
             let [a, b] = [(a, anchors[0]), (b, anchors[1])].map(|(a, frame)| Anchor { frame: a.frame * frame, ..a });
             let made = LoopJoint::new(spec.name.as_str(), spec.kind, a, b);

@@ -75,10 +75,10 @@ pub(crate) enum ObjectKind {
     Body { mode: Mode, sensor: bool },
     /// An articulated body, and whether a link of it has a sensor.
     Articulated { sensor: bool },
-    /// One of its links.
-    Link,
-    /// A loop joint.
-    Joint,
+    /// One of its links, and whether its joint has a drive with a target.
+    Link { driven: bool },
+    /// A loop joint, likewise.
+    Joint { driven: bool },
     /// A coupling of two joints.
     Mimic,
     /// A template, and the number of its bodies.
@@ -91,12 +91,12 @@ pub(crate) enum ObjectKind {
 
 impl ObjectKind {
     pub(crate) fn is_body(self) -> bool {
-        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Link)
+        matches!(self, ObjectKind::Body { .. } | ObjectKind::Articulated { .. } | ObjectKind::Link { .. })
     }
 
     /// Returns whether it is an object of its own, and not a part of one.
     pub(crate) fn is_object(self) -> bool {
-        !matches!(self, ObjectKind::Link | ObjectKind::Template(_))
+        !matches!(self, ObjectKind::Link { .. } | ObjectKind::Template(_))
     }
 }
 
@@ -181,7 +181,10 @@ impl ObjectNames {
 }
 
 /// The keys that say when, of which an event has one.
-const WHEN: [&str; 9] = ["time_s", "every_s", "contact", "parting", "enters", "leaves", "broken", "key", "after"];
+const WHEN: [&str; 12] = [
+    "time_s", "every_s", "contact", "touching", "parting", "enters", "leaves", "asleep", "awake", "broken", "key",
+    "after",
+];
 
 impl EventSpec {
     /// Reads an event. `lights` is the number of lights of the scene.
@@ -233,9 +236,18 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             let [a, b] = read_sides(&mut f, "contact", names);
             Some(Trigger::Contact { a, b, impulse: f.number_or("impulse_n_s", Bound::NOT_NEGATIVE, 0.0) })
         }
+        "touching" => {
+            let [a, b] = read_sides(&mut f, "touching", names);
+            Some(Trigger::Touching { a, b })
+        }
         "parting" => {
             let [a, b] = read_sides(&mut f, "parting", names);
             Some(Trigger::Parting { a, b })
+        }
+        "asleep" | "awake" => {
+            let some = |value: &&Value<'_>| value.get_ref().as_array().is_none_or(|items| !items.is_empty());
+            let bodies = f.value(key).filter(some).map_or(Vec::new(), |value| names.side(&f, key, value));
+            Some(if key == "asleep" { Trigger::Asleep { bodies } } else { Trigger::Awake { bodies } })
         }
         "enters" | "leaves" => {
             let sensor =
@@ -249,7 +261,12 @@ fn read_trigger(mut f: Fields<'_>, names: &ObjectNames) -> Option<Trigger<String
             })
         }
         "broken" => {
-            let joint = names.read(&mut f, "broken", |kind| kind == ObjectKind::Joint, "the name of a loop joint");
+            let joint = names.read(
+                &mut f,
+                "broken",
+                |kind| matches!(kind, ObjectKind::Joint { .. }),
+                "the name of a loop joint",
+            );
             joint.map(|joint| Trigger::Breaks { joint })
         }
         "key" => f.text("key", "the name of a key, such as \"k\"").and_then(|(key, value)| {

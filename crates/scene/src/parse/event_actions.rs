@@ -82,8 +82,9 @@ pub(crate) fn read_action(
         }
         "move" => read_move(&mut f, names),
         "drive" => {
-            let right = |kind| matches!(kind, ObjectKind::Link | ObjectKind::Joint | ObjectKind::Articulated { .. });
-            let body = names.read(&mut f, "drive", right, "the name of a loop joint, or \"OBJECT/LINK\"");
+            let right = |kind| matches!(kind, ObjectKind::Link { driven: true } | ObjectKind::Joint { driven: true });
+            let expected = "the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity";
+            let body = names.read(&mut f, "drive", right, expected);
             let target = read_target(&mut f);
             body.map(|body| Action::Drive { body, dof: 0, target, original: None })
         }
@@ -122,7 +123,7 @@ fn read_object(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Op
 }
 
 fn read_joint(f: &mut Fields<'_>, key: &'static str, names: &ObjectNames) -> Option<String> {
-    names.read(f, key, |kind| kind == ObjectKind::Joint, "the name of a loop joint")
+    names.read(f, key, |kind| matches!(kind, ObjectKind::Joint { .. }), "the name of a loop joint")
 }
 
 fn read_velocities(f: &mut Fields<'_>) -> [Vec3; 2] {

@@ -14,6 +14,7 @@ use crate::parse::body::{BodySpec, Library};
 use crate::parse::event::{EventSpec, ObjectKind, ObjectNames, TemplateSpec};
 use crate::parse::fields::Fields;
 use crate::parse::grid::{self, MAX_BODIES};
+use crate::parse::joint::JointSpec;
 use crate::parse::log::Log;
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec, Parts};
 use crate::parse::material::MaterialSpec;
@@ -27,6 +28,7 @@ use crate::parse::view::{CameraSpec, CavePlace, GroundSpec, LightSpec, SkySpec};
 use crate::parse::world::WorldSettings;
 use crate::save::SavedWorld;
 use tumble_core::Joint;
+use tumble_core::articulated::Drive;
 use tumble_core::collide::ContactMode;
 
 /// Largest scene file in bytes: 16 MiB.
@@ -353,12 +355,23 @@ fn object_names(
     for spec in articulated {
         let sensor = spec.links.iter().flat_map(|link| &link.shapes).any(|shape| shape.sensor && shape.collidable);
         names.add(&spec.name, ObjectKind::Articulated { sensor });
-        spec.links.iter().for_each(|link| names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link));
+        for link in &spec.links {
+            let driven = link.joint.is_single() && has_target(&link.joint.dof.drive);
+            names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link { driven });
+        }
     }
-    loop_joints.iter().for_each(|joint| names.add(&joint.name, ObjectKind::Joint));
+    for joint in loop_joints {
+        let driven = joint.dofs.first().is_some_and(|dof| has_target(&dof.settings.drive));
+        names.add(&joint.name, ObjectKind::Joint { driven });
+    }
     mimics.iter().for_each(|mimic| names.add(&mimic.name, ObjectKind::Mimic));
     templates.iter().for_each(|template| names.add_template(&template.body.name, template.count));
     names
+}
+
+/// Returns whether events can change the target of a drive.
+fn has_target(drive: &Drive) -> bool {
+    matches!(drive, Drive::Position { .. } | Drive::Velocity { .. })
 }
 
 fn read_events(f: &mut Fields<'_>, mut named: ObjectNames, lights: usize, names: &mut Taken) -> Vec<EventSpec> {
@@ -424,6 +437,20 @@ impl Parts for Objects<'_> {
             let link = name.strip_prefix(spec.name.as_str())?.strip_prefix('/')?;
             spec.link(link).map(|link| PartSpec::Link(k, link))
         })
+    }
+
+    fn moving_joint(&self, part: &PartSpec) -> Option<&JointSpec> {
+        let PartSpec::Link(spec, mut link) = *part else { return None };
+        let links = &self.articulated[spec].links;
+        while links[link].joint.kind == Joint::Fixed {
+            link = links[link].parent?;
+        }
+        Some(&links[link].joint)
+    }
+
+    fn own_joint(&self, part: &PartSpec) -> Option<&JointSpec> {
+        let PartSpec::Link(spec, link) = *part else { return None };
+        Some(&self.articulated[spec].links[link].joint)
     }
 
     fn floats(&self, articulated: usize) -> bool {

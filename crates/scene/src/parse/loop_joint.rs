@@ -85,6 +85,10 @@ pub struct LoopDofSpec {
 pub(crate) trait Parts {
     /// Returns the part of that name: `body`, or `object/link`.
     fn part(&self, name: &str) -> Option<PartSpec>;
+    /// Returns the joint that moves a link, that of its carrier for a fixed one; `None` for a body and a link on the base.
+    fn moving_joint(&self, part: &PartSpec) -> Option<&JointSpec>;
+    /// Returns the joint between a link and its parent; `None` for a body.
+    fn own_joint(&self, part: &PartSpec) -> Option<&JointSpec>;
     /// Returns the index of the articulated body of that name.
     fn articulated(&self, name: &str) -> Option<usize>;
     /// Returns whether the root of an articulated body floats.
@@ -168,6 +172,18 @@ impl LoopJointSpec {
         let twist = spherical.then(|| read_limits(&mut f, ("twist_limits_rad", Some("twist_limits_deg"))));
         let twist_limits_rad = twist.flatten().flatten();
         let dofs = read_dofs(&mut f, kind, Vec3::from(axis));
+        let length = length_m.or_else(|| length_at_start(kind, position_m, second_position_m?, ground_m, ratio));
+        let limits = dofs.first().and_then(|dof| dof.settings.limits);
+        if let (Some(limits), Some(length), Some(value)) = (limits, length, f.value("limits_m"))
+            && kind.limits_fault(limits, length).is_some()
+        {
+            let keeps = if kind == LoopJointKind::Distance { "keeps" } else { "allows at most" };
+            f.wrong(
+                "limits_m",
+                value,
+                format!("limits from 0 that allow the length which the joint {keeps}, {length} m"),
+            );
+        }
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
         let enabled = f.flag_or("enabled", true);
@@ -201,6 +217,15 @@ impl LoopJointSpec {
     }
 }
 
+/// Returns the length of a joint that has that of its placement, m.
+fn length_at_start(kind: LoopJointKind, a: [f64; 3], b: [f64; 3], ground: [[f64; 3]; 2], ratio: f64) -> Option<f64> {
+    let distance = |a: [f64; 3], b: [f64; 3]| (Vec3::from(a) - Vec3::from(b)).norm();
+    match kind {
+        LoopJointKind::Pulley => Some(distance(a, ground[0]) + ratio * distance(b, ground[1])),
+        _ => kind.has_length().then(|| distance(a, b)),
+    }
+}
+
 /// Reads two poses, if either key is present; an absent one is the identity.
 fn read_frames(f: &mut Fields<'_>, keys: [&'static str; 2]) -> Option<[Pose; 2]> {
     let frames = keys.map(|key| {
@@ -228,12 +253,13 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
         joints[0].dof.spring = Some(Spring { stiffness, rest: 0.0 });
     }
     let springs = kind != LoopJointKind::Spring;
-    if let Some(first) = joints.first_mut() {
-        first.read_loop_dof(f, springs, kind.has_length());
-        let first = first.clone();
-        if spherical {
-            joints.fill(first);
-        }
+    match joints.first_mut() {
+        Some(first) => first.read_loop_dof(f, springs, kind.has_length()),
+        None => refuse_settings(f, kind),
+    }
+    if spherical {
+        let first = joints[0].clone();
+        joints.fill(first);
     }
     let tables = if count > 1 { f.tables("dof", count) } else { Vec::new() };
     for (joint, mut table) in joints.iter_mut().zip(tables) {
@@ -242,6 +268,23 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
     }
     let spec = |JointSpec { dof, armature, holds_start, .. }| LoopDofSpec { settings: dof, armature, holds_start };
     joints.into_iter().map(spec).collect()
+}
+
+/// Reports settings of a position of a kind that has none.
+fn refuse_settings(f: &mut Fields<'_>, kind: LoopJointKind) {
+    for key in ["drive", "spring", "limits_rad", "limits_deg", "limits_m"] {
+        let given = f.entries().find(|(name, ..)| *name == key).and_then(|_| f.value(key));
+        if let Some(value) = given {
+            let positioned = LoopJointKind::NAMES.iter().filter(|(_, kind)| kind.has_position());
+            let names: Vec<&str> = positioned.map(|(name, _)| *name).collect();
+            let none = format!(
+                "no `{key}` of type \"{}\", which has no position; types with one: {}",
+                kind.name(),
+                names.join(", ")
+            );
+            f.wrong(key, value, none);
+        }
+    }
 }
 
 /// Reads the numbers of teeth of two gears.

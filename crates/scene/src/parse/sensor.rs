@@ -6,6 +6,7 @@ use tumble_core::{MAX_DELAY, Optics, SensorKind, SensorNoise};
 use crate::parse::body::{Library, read_name};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
+use crate::parse::joint::JointSpec;
 use crate::parse::loop_joint::{LoopJointSpec, PartSpec, Parts};
 use crate::parse::rotation;
 use crate::parse::shape::{ShapeContext, ShapeSpec};
@@ -15,7 +16,8 @@ use crate::parse::shape::{ShapeContext, ShapeSpec};
 pub enum SensorPlaceSpec {
     /// The world.
     World,
-    /// A body or a link. Kinds that read a joint read that which moves the link.
+    /// A body or a link. Kinds that read a joint read that which moves the link; positions, velocities and drives are those of a
+    /// joint of its own.
     Part(PartSpec),
     /// A loop joint, by its index in [`SceneFile::loop_joints`](crate::SceneFile::loop_joints).
     LoopJoint(usize),
@@ -100,6 +102,9 @@ impl SensorSpec {
                     let known = names.iter().chain(joints.iter().map(|joint| &joint.name)).map(String::as_str);
                     f.unknown_name("on", value, name, known.collect());
                 }
+                if let Some(expected) = found.and_then(|place| unreadable(kind, place, parts, joints)) {
+                    f.wrong("on", value, expected);
+                }
                 found
             }
         };
@@ -123,6 +128,29 @@ impl SensorSpec {
             optics,
             enabled,
         })
+    }
+}
+
+/// Returns what a sensor of that kind may be on, if it cannot be on this.
+fn unreadable(
+    kind: SensorKind,
+    place: SensorPlaceSpec,
+    parts: &impl Parts,
+    joints: &[LoopJointSpec],
+) -> Option<&'static str> {
+    let (dof, joint) = (kind.reads_dof(), kind.reads_joint());
+    match place {
+        SensorPlaceSpec::Part(part) if dof && !parts.own_joint(&part).is_some_and(JointSpec::is_single) => {
+            Some("a link with a revolute or prismatic joint, or a loop joint with a position")
+        }
+        SensorPlaceSpec::Part(part) if joint && parts.moving_joint(&part).is_none() => {
+            Some("a link of an articulated body that a joint moves, or a loop joint")
+        }
+        SensorPlaceSpec::LoopJoint(at) if dof && !joints[at].kind.has_position() => {
+            Some("a loop joint with a position, not one of this type, or a link with a revolute or prismatic joint")
+        }
+        SensorPlaceSpec::LoopJoint(_) if !dof && !joint => Some("a body or a link: this type of sensor reads a site"),
+        _ => None,
     }
 }
 

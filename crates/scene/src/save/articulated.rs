@@ -12,7 +12,7 @@ use super::surface;
 use super::text::Table;
 use crate::parse::appearance::AppearanceSpec;
 
-/// Everything fixed to one moving link, or to the base.
+/// The shapes of one link.
 struct Carried<'b> {
     colliders: Vec<(usize, &'b Collider)>,
     visuals: Vec<&'b Visual>,
@@ -128,14 +128,13 @@ impl Writer<'_> {
             }
         }
         t.extend(self.mounts(body, k));
-        let shapes = self.shapes(body, name, &carried(body, Some(k)), &Pose::identity());
+        let shapes = self.shapes(body, name, &carried(body, name), &Pose::identity());
         t.extend(mass_of(&body.link_mass(name).unwrap_or_else(LinkMass::none), !shapes.is_empty()));
         t.extend(shapes);
         t
     }
 
-    /// Writes a link without a joint. The first one on the base has everything that is fixed to the
-    /// base.
+    /// Writes a link without a joint. The first one on the base has the cameras and lights of the base.
     fn fixed_link(&mut self, body: &ArticulatedBody, frame: &LinkFrame) -> Table {
         let LinkFrame { name, link, pose, mass } = frame;
         let mut t = Table::of("name", name);
@@ -143,11 +142,10 @@ impl Writer<'_> {
         t.put_pose(pose);
         t.put("joint", "fixed");
         let first = body.model().frames().iter().find(|f| f.link.is_none()).is_some_and(|f| f.name == *name);
-        let mut shapes = Table::default();
         if first {
             t.extend(self.mounts(body, body.model().links().len()));
-            shapes = self.shapes(body, name, &carried(body, None), pose);
         }
+        let shapes = self.shapes(body, name, &carried(body, name), pose);
         t.extend(mass_of(mass, !shapes.is_empty()));
         t.extend(shapes);
         t
@@ -254,15 +252,15 @@ fn mass_of(mass: &LinkMass, has_shapes: bool) -> Table {
     t
 }
 
-/// Returns colliders and visuals of a moving link, or of the base.
-fn carried(body: &ArticulatedBody, link: Option<usize>) -> Carried<'_> {
-    let part = link.unwrap_or(body.model().links().len());
-    let visuals = body.renderable().map_or(&[][..], |r| r.visuals());
+/// Returns colliders and visuals of a link, which may be a fixed one.
+fn carried<'b>(body: &'b ArticulatedBody, link: &str) -> Carried<'b> {
+    let (link, first) = (body.model().frame_index(link), body.model().links().len() + 1);
+    let parts = body.colliders().enumerate().map(|(k, (_, collider))| (first + k, collider));
     // a stand-in for meshes that can be read is not drawn
-    let drawn = |visual: &&Visual| visual.part == part && visual.drawn().is_some();
+    let visuals = body.visuals_of_links().filter(|(of, visual)| Some(*of) == link && visual.drawn().is_some());
     Carried {
-        colliders: body.colliders_of(link).zip(body.colliders().filter(|(l, _)| *l == link).map(|(_, c)| c)).collect(),
-        visuals: visuals.iter().filter(drawn).collect(),
+        colliders: parts.filter(|(part, _)| body.frame_of(*part) == link).collect(),
+        visuals: visuals.map(|(_, visual)| visual).collect(),
     }
 }
 

@@ -115,6 +115,8 @@ impl Comparison<'_> {
                     };
                     self.compare(&path, &list(self.shapes[0], ours), &list(self.shapes[1], read));
                 }
+                // a sensor that names no link reads that of its part, which the text names
+                "link" if ours.is_null() && a.contains_key("frame") => {}
                 "colliders" => self.compare(&path, &sorted(ours, "link"), &sorted(read, "link")),
                 "couplings" => self.compare(&path, &sorted(ours, "dof"), &sorted(read, "dof")),
                 "excluded_pairs" => self.contained(&path, ours, read),

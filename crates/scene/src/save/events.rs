@@ -71,6 +71,9 @@ impl Writer<'_> {
                 t.put_unless(0.0, "impulse_n_s", *impulse);
                 t
             }
+            Trigger::Touching { a, b } => Table::of("touching", sides(a, b)?),
+            Trigger::Asleep { bodies } => Table::of("asleep", all(bodies)?),
+            Trigger::Awake { bodies } => Table::of("awake", all(bodies)?),
             Trigger::Parting { a, b } => Table::of("parting", sides(a, b)?),
             Trigger::Enters { sensor, bodies } | Trigger::Leaves { sensor, bodies } => {
                 let key = if matches!(trigger, Trigger::Enters { .. }) { "enters" } else { "leaves" };
@@ -186,7 +189,7 @@ impl Writer<'_> {
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
         let on = match sensor.place() {
-            SensorPlace::Site(Anchor { part: None, frame }) => {
+            SensorPlace::Site(Anchor { part: None, frame, .. }) => {
                 t.put_pose(frame);
                 None
             }

@@ -98,7 +98,7 @@ impl Writer<'_> {
     /// Returns the name of the part of a side, and its frame in the frame of the body or link;
     /// no name for the world.
     pub(super) fn anchor(&mut self, side: &Anchor) -> (Option<String>, Pose) {
-        let Anchor { part, frame } = side;
+        let Anchor { part, frame, link: named } = side;
         let Some((id, part)) = *part else { return (None, *frame) };
         let Some(name) = self.world.name(id).map(str::to_owned) else {
             self.fault("a loop joint of an object that was removed".into());
@@ -114,7 +114,9 @@ impl Writer<'_> {
             Some(collider) => body.colliders().nth(collider).map_or(*frame, |(_, c)| c.pose * frame),
             None => *frame,
         };
-        match link_name(body, part) {
+        let named =
+            named.and_then(|link| body.model().frames().get(link)).map(|frame| (frame.name.as_str(), frame.pose));
+        match named.or_else(|| link_name(body, part)) {
             Some((link, pose)) => (Some(format!("{name}/{link}")), pose.inverse() * on_link),
             None => {
                 self.fault(format!("a joint on the base of \"{name}\", which has no link that is fixed to its base"));

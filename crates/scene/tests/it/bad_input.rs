@@ -632,3 +632,58 @@ fn pairs() {
         &["s.toml:9:1: pair 2 names the same two as the pair at line 6; expected each pair once"],
     );
 }
+
+/// Returns two balls, and a loop joint with the given keys from line 14 on.
+fn joint_with(keys: &str) -> String {
+    let ball = |name: &str, x: f64| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nshape = {{ type = \"sphere\", radius_m = 0.1 }}\nmass_kg = 1\nposition_m = [{x}, 0, 1]\n"
+        )
+    };
+    format!("{}{}[[loop_joint]]\nname = \"j\"\na = \"x\"\n{keys}\nb = \"y\"\n", ball("x", 0.0), ball("y", 1.0))
+}
+
+#[test]
+fn limits_that_exclude_the_length_of_a_joint() {
+    let ends = "position_m = [0, 0, 1]\nsecond_position_m = [1, 0, 1]";
+    let with = |kind: &str, more: &str| joint_with(&format!("type = \"{kind}\"\n{ends}\n{more}"));
+    let expected = |limits: &str, keeps: &str| {
+        format!(
+            "s.toml:17:12: `limits_m` of loop_joint \"j\" is {limits}; expected limits from 0 that allow the length which the \
+             joint {keeps} m"
+        )
+    };
+    for (kind, limits, more, keeps) in [
+        ("distance", "[2, 3]", "", "keeps, 1"),
+        ("distance", "[0, 0.5]", "", "keeps, 1"),
+        ("distance", "[0, 1]", "length_m = 1.5", "keeps, 1.5"),
+        ("distance", "[-2, -1]", "", "keeps, 1"),
+        ("rope", "[2, 3]", "", "allows at most, 1"),
+    ] {
+        let text = with(kind, &format!("limits_m = {limits}\n{more}"));
+        assert_errors(&text, &[&expected(limits, keeps)]);
+    }
+    for (kind, limits, more) in [
+        ("distance", "[1, 1]", ""),
+        ("distance", "[2, 3]", "length_m = 2.5"),
+        ("rope", "[0.5, 3]", ""),
+        ("spring", "[2, 3]", "stiffness_n_per_m = 10"),
+    ] {
+        let text = with(kind, &format!("limits_m = {limits}\n{more}"));
+        let scene = SceneFile::parse(&text, "s.toml").unwrap_or_else(|e| panic!("{e}"));
+        assert!(scene.build().is_ok(), "{text}");
+    }
+}
+
+#[test]
+fn settings_of_joints_without_a_position() {
+    let gear = "type = \"gear\"\nposition_m = [0, 0, 1]\naxis = [0, 0, 1]\nteeth = [2, 3]\n";
+    let types = "revolute, prismatic, spherical, cylindrical, distance, rope, spring, screw, pulley";
+    assert_errors(
+        &joint_with(&format!("{gear}drive = {{ type = \"velocity\", target_rad_per_s = 1 }}")),
+        &[&format!(
+            "s.toml:18:9: `drive` of loop_joint \"j\" is {{ type = \"velocity\", target_rad_per_s = 1 }}; expected no `drive` of \
+             type \"gear\", which has no position; types with one: {types}"
+        )],
+    );
+}

@@ -62,6 +62,14 @@ fn wrong_events_are_refused_with_line_and_column() {
             "when = { time_s = 1 }\ndo = [{ light = 2, intensity = 1 }]".into(),
             "s.toml:13:17: `light` of do 1 is 2; expected an integer from 1 to 1",
         ),
+        (
+            "when = { time_s = 1 }\ndo = [{ drive = \"gears\", target = 1 }]\n[[body]]\nname = \"x\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1\n[[loop_joint]]\nname = \"gears\"\ntype = \"gear\"\na = \"floor\"\nb = \"x\"\nposition_m = [0, 0, 1]\naxis = [0, 0, 1]\nteeth = [1, 2]".into(),
+            "s.toml:13:17: `drive` of do 1 is \"gears\"; expected the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity",
+        ),
+        (
+            format!("when = {{ asleep = 1 }}\n{spawn}"),
+            "s.toml:12:19: `asleep` of `when` of event \"e\" is 1; expected the name of a body",
+        ),
         ("when = { time_s = 1 }".into(), "s.toml:10:1: event \"e\" has no `do`"),
         ("when = { time_s = 1 }\ndo = [{ spwan = \"ball\" }]".into(), "s.toml:13:7: do 1 does not say what is done"),
     ];

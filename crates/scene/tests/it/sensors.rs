@@ -42,6 +42,27 @@ mass_kg = 1.0
 center_m = [0, 0, -0.5]
 inertia_kg_m2 = [0.1, 0.1, 0.01]
 
+[[articulated]]
+name = "post"
+position_m = [5, 0, 0]
+
+[[articulated.link]]
+name = "plate"
+joint = "fixed"
+
+[[articulated.link]]
+name = "lift"
+parent = "plate"
+joint = "prismatic"
+axis = [0, 0, 1]
+mass_kg = 1.0
+
+[[articulated.link]]
+name = "cap"
+parent = "lift"
+joint = "fixed"
+mass_kg = 1.0
+
 [[loop_joint]]
 name = "hook"
 type = "fixed"
@@ -131,7 +152,7 @@ fn faults_of_sensors_are_reported_with_their_place() {
             Err(error) => error.to_string(),
             Ok(scene) => scene.build().err().unwrap().to_string(),
         };
-        assert!(said.contains("s.toml"), "{said}");
+        assert!(said.contains("s.toml:"), "{said}");
         said
     };
     for (sensor, expected) in [
@@ -141,10 +162,17 @@ fn faults_of_sensors_are_reported_with_their_place() {
         ("type = \"gyroscope\"\non = \"box\"\ndeviation = -1", "deviation"),
         ("type = \"gyroscope\"\non = \"box\"\nvolume = { type = \"sphere\", radius_m = 1 }", "unknown key `volume`"),
         ("type = \"gyroscope\"\non = \"box\"\nrelative_to = \"lamp\"", "unknown key `relative_to`"),
-        ("type = \"force\"\non = \"box\"", "a link of an articulated body that a joint moves"),
-        ("type = \"joint_position\"\non = \"box\"", "no revolute or prismatic joint"),
-        ("type = \"joint_position\"\non = \"hook\"", "have no position"),
-        ("type = \"gyroscope\"\non = \"hook\"", "it reads a site"),
+        ("type = \"force\"\non = \"box\"", "`on` of sensor \"bad\" is \"box\""),
+        (
+            "type = \"force\"\non = \"box\"",
+            "expected a link of an articulated body that a joint moves, or a loop joint",
+        ),
+        ("type = \"torque\"\non = \"post/plate\"", "expected a link of an articulated body that a joint moves"),
+        ("type = \"joint_velocity\"\non = \"post/plate\"", "expected a link with a revolute or prismatic joint"),
+        ("type = \"drive_force\"\non = \"post/cap\"", "expected a link with a revolute or prismatic joint"),
+        ("type = \"joint_position\"\non = \"box\"", "expected a link with a revolute or prismatic joint"),
+        ("type = \"joint_position\"\non = \"hook\"", "expected a loop joint with a position"),
+        ("type = \"gyroscope\"\non = \"hook\"", "expected a body or a link: this type of sensor reads a site"),
     ] {
         let said = fault(sensor);
         assert!(said.contains(expected), "{sensor}: {said}");

@@ -230,6 +230,11 @@ impl Model {
         self.frames.iter().find(|f| f.name == name)
     }
 
+    /// Returns the index in [`frames`](Self::frames) of the frame of that name.
+    pub fn frame_index(&self, name: &str) -> Option<usize> {
+        self.frames.iter().position(|f| f.name == name)
+    }
+
     /// Returns the index of the moving link of that name.
     pub fn link(&self, name: &str) -> Option<usize> {
         self.links.iter().position(|l| l.name == name)

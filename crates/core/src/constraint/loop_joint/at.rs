@@ -13,17 +13,20 @@ pub struct Anchor {
     pub part: Option<(ObjectId, usize)>,
     /// The frame in the part's axes, or in the world's if there is no part; m.
     pub frame: Pose,
+    /// The link whose shapes a touch sensor reads, an index in [`Model::frames`](crate::Model::frames) of an articulated
+    /// body; `None` for the link of the part. Nothing else reads it.
+    pub link: Option<usize>,
 }
 
 impl Anchor {
     /// Returns a frame of the world.
     pub fn world(frame: Pose) -> Anchor {
-        Anchor { part: None, frame }
+        Anchor { part: None, frame, link: None }
     }
 
     /// Returns a frame fixed to one part of an object.
     pub fn on(id: ObjectId, part: usize, frame: Pose) -> Anchor {
-        Anchor { part: Some((id, part)), frame }
+        Anchor { part: Some((id, part)), frame, link: None }
     }
 }
 

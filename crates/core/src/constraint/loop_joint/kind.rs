@@ -113,6 +113,24 @@ impl LoopJointKind {
         matches!(self, Distance | Rope | Spring | Pulley)
     }
 
+    /// Returns why limits of a length, m, contradict the length that the joint keeps: the limit, its value and its admissible
+    /// range. A distance keeps its length within a billionth of it, a rope and a pulley keep theirs at most.
+    pub fn limits_fault(self, [lower, upper]: [f64; 2], length: f64) -> Option<(&'static str, f64, &'static str)> {
+        use LoopJointKind::{Distance, Pulley, Rope};
+        let rounding = 1e-9 * length.max(1.0);
+        match self {
+            _ if !self.has_length() => None,
+            _ if upper < 0.0 => Some(("the upper limit of its length", upper, "at least 0: it is a length")),
+            Distance | Rope | Pulley if lower > length + rounding => {
+                Some(("the lower limit of its length", lower, "at most the length of the joint"))
+            }
+            Distance if upper < length - rounding => {
+                Some(("the upper limit of its length", upper, "at least the length of the joint"))
+            }
+            _ => None,
+        }
+    }
+
     /// Returns whether it needs a part on both sides.
     pub fn joins_two_parts(self) -> bool {
         matches!(self, LoopJointKind::Gear | LoopJointKind::Rack | LoopJointKind::Pulley)

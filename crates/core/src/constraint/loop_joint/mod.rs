@@ -380,6 +380,16 @@ impl LoopJoint {
         LoopJointError::Kind { name: self.name.clone(), kind: self.kind.name(), what }
     }
 
+    /// Checks that limits allow the length that the joint keeps.
+    fn check_limits(&self, [lower, upper]: [f64; 2], length: f64) -> Result<(), LoopJointError> {
+        match self.kind.limits_fault([lower, upper], length) {
+            Some((what, value, expected)) => {
+                Err(LoopJointError::Range { name: self.name.clone(), what, value, expected })
+            }
+            None => Ok(()),
+        }
+    }
+
     fn check(&self, what: &'static str, value: f64, fine: bool, expected: &'static str) -> Result<(), LoopJointError> {
         match fine {
             true => Ok(()),

@@ -58,8 +58,8 @@ impl LoopJoint {
     /// degrees of freedom are the components of a rotation vector. A velocity drive of it that may meet them needs a largest torque.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a setting out of its range, [`LoopJointError::Kind`] for a joint
-    /// without such a degree of freedom.
+    /// [`LoopJointError::Range`] for a setting out of its range, and for limits that exclude the length that the joint
+    /// keeps; [`LoopJointError::Kind`] for a joint without such a degree of freedom.
     pub fn set_dof_at(&mut self, k: usize, dof: DofSettings) -> Result<(), LoopJointError> {
         self.check_dof(k, &dof)?;
         if let (LoopJointKind::Spring, Some(spring)) = (self.kind, dof.spring) {
@@ -81,6 +81,13 @@ impl LoopJoint {
         }
         if let Some((what, value, expected)) = dof.range_error(true) {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
+        }
+        let own = match (self.kind, dof.spring) {
+            (LoopJointKind::Spring, Some(spring)) => spring.rest,
+            _ => self.length(),
+        };
+        if let Some(limits) = dof.limits {
+            self.check_limits(limits, own)?;
         }
         let span = dof.limits.map_or(0.0, |[lo, hi]| hi - lo);
         let expected = match self.kind {
@@ -162,13 +169,16 @@ impl LoopJoint {
     /// Sets the length of a distance, a rope or a spring, m.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a length that is not finite and at least 0,
+    /// [`LoopJointError::Range`] for a length that is not finite and at least 0, or that the limits exclude,
     /// [`LoopJointError::Kind`] for a joint without a length.
     pub fn set_length(&mut self, length: f64) -> Result<(), LoopJointError> {
         if !self.kind.has_length() {
             return Err(self.wrong_kind("length"));
         }
         self.check("the length", length, length.is_finite() && length >= 0.0, "finite and at least 0")?;
+        if let Some(limits) = self.dof().limits {
+            self.check_limits(limits, length)?;
+        }
         self.length = Some(length);
         if let (LoopJointKind::Spring, Some(spring)) = (self.kind, &mut self.dofs[0].settings.spring) {
             spring.rest = length;

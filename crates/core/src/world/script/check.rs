@@ -173,7 +173,7 @@ fn check_trigger(trigger: &Trigger, world: &World) -> Result<(), EventError> {
             bodies(a)?;
             bodies(b)
         }
-        Trigger::Parting { a, b } => bodies(a).and_then(|()| bodies(b)),
+        Trigger::Touching { a, b } | Trigger::Parting { a, b } => bodies(a).and_then(|()| bodies(b)),
         Trigger::Enters { sensor, bodies: list } | Trigger::Leaves { sensor, bodies: list } => {
             let object = world.object(*sensor).ok_or(EventError::Gone("the sensor of an event"))?;
             if !object.collidable().is_some_and(|parts| (0..parts.parts()).any(|part| parts.is_sensor(part))) {
@@ -181,6 +181,7 @@ fn check_trigger(trigger: &Trigger, world: &World) -> Result<(), EventError> {
             }
             bodies(list)
         }
+        Trigger::Asleep { bodies: list } | Trigger::Awake { bodies: list } => bodies(list),
         Trigger::Breaks { joint } => of_kind::<LoopJoint>(world, *joint, "a loop joint"),
         Trigger::Key { key } if (1..=MAX_KEY_BYTES).contains(&key.len()) => Ok(()),
         Trigger::Key { key } => Err(EventError::Key(key.len())),

@@ -33,6 +33,13 @@ pub enum Trigger<B = ObjectId> {
         /// Threshold of the impulse over a frame, N·s, at least 0.
         impulse: f64,
     },
+    /// A body of `a` and one of `b` are in contact, in every frame after the one in which they came into contact.
+    Touching {
+        /// Bodies of one side.
+        a: Vec<B>,
+        /// Bodies of the other side: the *other* body of the event.
+        b: Vec<B>,
+    },
     /// A body of `a` and one of `b` part.
     Parting {
         /// Bodies of one side.
@@ -51,6 +58,16 @@ pub enum Trigger<B = ObjectId> {
     Leaves {
         /// The sensor.
         sensor: B,
+        /// The bodies that count.
+        bodies: Vec<B>,
+    },
+    /// A body falls asleep: the *other* body of the event.
+    Asleep {
+        /// The bodies that count.
+        bodies: Vec<B>,
+    },
+    /// A body wakes in a frame: the *other* body of the event.
+    Awake {
         /// The bodies that count.
         bodies: Vec<B>,
     },
@@ -79,9 +96,12 @@ impl<B> Trigger<B> {
             Trigger::Time { at } => Trigger::Time { at: *at },
             Trigger::Every { period, first } => Trigger::Every { period: *period, first: *first },
             Trigger::Contact { a, b, impulse } => Trigger::Contact { a: all(a), b: all(b), impulse: *impulse },
+            Trigger::Touching { a, b } => Trigger::Touching { a: all(a), b: all(b) },
             Trigger::Parting { a, b } => Trigger::Parting { a: all(a), b: all(b) },
             Trigger::Enters { sensor, bodies } => Trigger::Enters { bodies: all(bodies), sensor: f(sensor) },
             Trigger::Leaves { sensor, bodies } => Trigger::Leaves { bodies: all(bodies), sensor: f(sensor) },
+            Trigger::Asleep { bodies } => Trigger::Asleep { bodies: all(bodies) },
+            Trigger::Awake { bodies } => Trigger::Awake { bodies: all(bodies) },
             Trigger::Breaks { joint } => Trigger::Breaks { joint: f(joint) },
             Trigger::Key { key } => Trigger::Key { key: key.clone() },
             Trigger::Fired { event } => Trigger::Fired { event: f(event) },
@@ -91,18 +111,18 @@ impl<B> Trigger<B> {
     /// Returns the bodies that can be the *other* one; empty for every body, or none.
     pub fn others(&self) -> &[B] {
         match self {
-            Trigger::Contact { b, .. } | Trigger::Parting { b, .. } => b,
+            Trigger::Contact { b, .. } | Trigger::Touching { b, .. } | Trigger::Parting { b, .. } => b,
             Trigger::Enters { bodies, .. } | Trigger::Leaves { bodies, .. } => bodies,
+            Trigger::Asleep { bodies } | Trigger::Awake { bodies } => bodies,
             _ => &[],
         }
     }
 
     /// Returns whether a firing has an *other* body.
     pub fn has_other(&self) -> bool {
-        matches!(
-            self,
-            Trigger::Contact { .. } | Trigger::Parting { .. } | Trigger::Enters { .. } | Trigger::Leaves { .. }
-        ) || matches!(self, Trigger::Fired { .. })
+        use Trigger::{Asleep, Awake, Contact, Enters, Fired, Leaves, Parting, Touching};
+        let pair = matches!(self, Contact { .. } | Touching { .. } | Parting { .. } | Enters { .. } | Leaves { .. });
+        pair || matches!(self, Asleep { .. } | Awake { .. } | Fired { .. })
     }
 }
 
@@ -132,7 +152,11 @@ impl Trigger {
             {
                 pair(a, b)
             }
+            (Trigger::Touching { a, b }, EventKind::ContactPersist) => pair(a, b),
             (Trigger::Parting { a, b }, EventKind::ContactEnd) => pair(a, b),
+            (Trigger::Asleep { bodies }, EventKind::Asleep) | (Trigger::Awake { bodies }, EventKind::Awake) => {
+                in_list(bodies, happened.a).then_some(Some(happened.a))
+            }
             (Trigger::Enters { sensor, bodies }, EventKind::SensorBegin)
             | (Trigger::Leaves { sensor, bodies }, EventKind::SensorEnd) => visitor(*sensor, bodies),
             (Trigger::Breaks { joint }, EventKind::JointBroken) => (happened.a == *joint).then_some(None),

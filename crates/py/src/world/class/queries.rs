@@ -30,14 +30,14 @@ impl World {
     }
 
     /// The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
-    /// ``impulse``, ``point``, ``shapes``, ``shape_names``.
+    /// ``impulse``, ``point``, ``shapes``, ``shape_names``, ``links``.
     ///
     /// kind: ``"contact_begin"``, ``"contact_persist"`` (in contact in the step before too),
     /// ``"contact_end"``, ``"sensor_begin"``, ``"sensor_end"``, ``"asleep"``, ``"awake"``, ``"joint_broken"``. a, b: handles
     /// of the bodies, the sensor first, or the joint; b is None for sleep and joints. parts: the touched links, as in
     /// ``contacts``. impulse: on ``a`` over the step, shape (3,), N·s; point: where the largest one
     /// acts, shape (3,), m; both zero for all but contacts that begin or persist. World axes. shapes, shape_names: the shapes
-    /// that touch there, as in ``contacts``, and their names.
+    /// that touch there, as in ``contacts``, and their names. links: names of the touched links, fixed ones too.
     ///
     /// Two bodies are in contact in a step if their surfaces touch or an impulse acts between them, of
     /// at least ``event_impulse`` of the world. Of ``step(n)`` the last step counts. Pairs in contact

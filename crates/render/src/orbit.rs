@@ -2,9 +2,9 @@
 //!
 //! Drag with the left button: turn. Middle or right button: move. Wheel: distance.
 
+use crate::Camera;
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
-use tumble::render::Camera;
-use tumble::render::winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 
 /// Turn per pixel, rad.
 const TURN: f32 = 0.006;
