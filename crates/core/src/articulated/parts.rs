@@ -63,7 +63,7 @@ impl ArticulatedBody {
         let material = collider.material.validate();
         material.map_err(|(what, value, expected)| range(what, value, expected))?;
         let unit = collider.pose.rotation.norm();
-        if !((unit - 1.0).abs() < 1e-6) {
+        if unit.is_nan() || (unit - 1.0).abs() >= 1e-6 {
             return Err(range("norm of the orientation", unit, "1"));
         }
         if let Some(value) = collider.pose.translation.vector.iter().find(|x| !x.is_finite()) {
