@@ -678,7 +678,7 @@ fn limits_that_exclude_the_length_of_a_joint() {
 #[test]
 fn settings_of_joints_without_a_position() {
     let gear = "type = \"gear\"\nposition_m = [0, 0, 1]\naxis = [0, 0, 1]\nteeth = [2, 3]\n";
-    let types = "revolute, prismatic, spherical, cylindrical, distance, rope, spring, screw, pulley";
+    let types = "revolute, prismatic, spherical, cylindrical, universal, planar, distance, rope, spring, screw, pulley";
     assert_errors(
         &joint_with(&format!("{gear}drive = {{ type = \"velocity\", target_rad_per_s = 1 }}")),
         &[&format!(
