@@ -121,7 +121,8 @@ fn behaviors() -> World {
 
 /// Archives of the worlds, at the start and a few frames later.
 fn seeds() -> Vec<(String, Vec<u8>)> {
-    let worlds: [(&str, fn() -> World); 4] =
+    type Maker = fn() -> World;
+    let worlds: [(&str, Maker); 4] =
         [("bodies", bodies), ("robot", robot), ("scripted", scripted), ("behaviors", behaviors)];
     let mut seeds = Vec::new();
     for (name, made) in worlds {

@@ -115,7 +115,7 @@ fn a_pulley_keeps_the_length_by_default_when_it_is_saved() {
             };
             world
                 .change_joint(id, |joint| {
-                    change(joint).map_err(|e| panic!("{e}")).map(|()| ()).or(Err(tumble_core::WorldError::Stale))
+                    change(joint).map_err(|e| panic!("{e}")).or(Err(tumble_core::WorldError::Stale))
                 })
                 .unwrap();
             assert_eq!(joint(world).length(), if length.is_some() { 7.0 } else { 9.0 });
