@@ -7,7 +7,8 @@
 //! | a part of another object with several parts | `OBJECT/NUMBER` |
 //!
 //! If a link of a body has no name, or another body or link has the same name in full, all links of that body have their
-//! numbers instead, the indices in [`Model::frames`](tumble_core::Model::frames): `leg/3`.
+//! numbers instead, the indices in [`Model::frames`](tumble_core::Model::frames): `leg/3`. If one of these is taken too, they are
+//! `leg/#3`, with as many `#` as it takes.
 
 use crate::record::MAX_NAME_BYTES;
 use std::cell::RefCell;
@@ -37,13 +38,13 @@ impl Site {
 /// The names of the sites of a world.
 pub(crate) struct Names<'w> {
     world: &'w World,
-    /// Whether the links of a body have numbers, for the bodies that were asked for.
-    numbered: RefCell<BTreeMap<ObjectId, bool>>,
+    /// The styles of the objects that were asked for.
+    styles: RefCell<BTreeMap<ObjectId, usize>>,
 }
 
 impl<'w> Names<'w> {
     pub fn of(world: &'w World) -> Names<'w> {
-        Names { world, numbered: RefCell::default() }
+        Names { world, styles: RefCell::default() }
     }
 
     /// Returns the name of an object.
@@ -53,32 +54,44 @@ impl<'w> Names<'w> {
 
     /// Returns the name of a site.
     pub fn site(&self, site: Site) -> String {
-        let name = |id: ObjectId| self.world.name(id).unwrap_or_default();
-        match site {
-            Site::Part(id, part) => {
-                let several = self.world.view().state_range(id).is_some_and(|span| span.parts.len() > 1);
-                shortened(if several { format!("{}/{part}", name(id)) } else { name(id).to_owned() })
-            }
-            Site::Link(id, link) => {
-                let named = self.link(id, link).filter(|_| !self.is_numbered(id));
-                shortened(format!("{}/{}", name(id), named.map_or_else(|| link.to_string(), str::to_owned)))
-            }
+        let (Site::Part(id, k) | Site::Link(id, k)) = site;
+        let name = self.world.name(id).unwrap_or_default();
+        shortened(match site {
+            Site::Part(..) if self.parts(id) <= 1 => name.to_owned(),
+            _ => format!("{name}/{}", self.within(id, k, self.style(id))),
+        })
+    }
+
+    /// Returns the number of parts of an object, or of links of an articulated body.
+    fn parts(&self, id: ObjectId) -> usize {
+        match self.world.get::<ArticulatedBody>(id) {
+            Some(body) => body.model().frames().len(),
+            None => self.world.view().state_range(id).map_or(0, |span| span.parts.len()),
         }
     }
 
-    /// Returns the name of a link without that of its body.
-    pub fn link(&self, id: ObjectId, link: usize) -> Option<&'w str> {
-        Some(&self.world.get::<ArticulatedBody>(id)?.model().frames().get(link)?.name)
+    /// Returns the name of a link or part without that of its object: in style 0 that of the link, which may be empty, then
+    /// the number, then the number with one more `#` in front in each style.
+    fn within(&self, id: ObjectId, k: usize, style: usize) -> String {
+        match style.checked_sub(1) {
+            None => self.world.get::<ArticulatedBody>(id).map_or(String::new(), |b| b.model().frames()[k].name.clone()),
+            Some(marks) => format!("{}{k}", "#".repeat(marks)),
+        }
     }
 
-    fn is_numbered(&self, id: ObjectId) -> bool {
-        if let Some(known) = self.numbered.borrow().get(&id) {
+    /// Returns the first style in which all links or parts of an object have names that nothing else has.
+    fn style(&self, id: ObjectId) -> usize {
+        if let Some(known) = self.styles.borrow().get(&id) {
             return *known;
         }
-        let frames = self.world.get::<ArticulatedBody>(id).map_or(&[][..], |body| body.model().frames());
-        let numbered = frames.iter().any(|frame| frame.name.is_empty() || self.is_taken(id, &frame.name));
-        self.numbered.borrow_mut().insert(id, numbered);
-        numbered
+        let fits = |style: &usize| {
+            let mut names = (0..self.parts(id)).map(|k| self.within(id, k, *style));
+            names.all(|name| !name.is_empty() && !self.is_taken(id, &name))
+        };
+        // each object can take one style
+        let style = (0..=self.world.ids().len() + 1).find(fits).unwrap_or(1);
+        self.styles.borrow_mut().insert(id, style);
+        style
     }
 
     /// Returns whether another object, or a part or link of another object, has the full name of a link.

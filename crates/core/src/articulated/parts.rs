@@ -97,7 +97,13 @@ impl ArticulatedBody {
         }
         (self.base, self.cameras, self.lights) = (base, cameras, lights);
         couplings.into_iter().try_for_each(|coupling| self.couple(coupling))?;
-        self.excluded_pairs = excluded_pairs;
+        let links = self.model.links().len();
+        if let Some(link) = excluded_pairs.iter().flatten().flatten().find(|link| **link >= links) {
+            return Err(self.no_link(&format!("number {link}")));
+        }
+        self.excluded_pairs = excluded_pairs.into_iter().map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        self.excluded_pairs.sort_unstable();
+        self.excluded_pairs.dedup();
         self.start = start;
         Ok(self)
     }

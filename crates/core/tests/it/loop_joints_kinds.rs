@@ -450,8 +450,14 @@ fn a_change_of_a_joint_wakes_what_it_joins() {
 fn wrong_settings_are_named() {
     let mut world = world("time_stepping", DT);
     let id = ball(&mut world, at(0.0, 0.0, 0.0));
+    let other = ball(&mut world, at(3.0, 0.0, 0.0));
     let joint = |kind| join(&world, kind, id, None, JointPlace::between(Vec3::zeros(), Vec3::x()));
     let of = |result: Result<LoopJoint, LoopJointError>| result.unwrap_err().to_string();
+    let spring = |rest| DofSettings { spring: Some(Spring { stiffness: 10.0, rest }), ..DofSettings::default() };
+    // a rope of 5 m on each side
+    let ends = JointPlace::between(Vec3::zeros(), Vec3::x() * 3.0);
+    let ends = JointPlace { ground: [Vec3::z() * 5.0, Vec3::new(3.0, 0.0, 5.0)], ..ends };
+    let pulley = join(&world, LoopJointKind::Pulley, id, Some(other), ends).with_limits([9.0, 12.0]).unwrap();
     for (message, words) in [
         (of(joint(LoopJointKind::Fixed).with_limits([0.0, 1.0])), "a fixed joint has no limits"),
         (of(joint(LoopJointKind::Revolute).with_length(1.0)), "a revolute joint has no length"),
@@ -473,6 +479,13 @@ fn wrong_settings_are_named() {
             "the upper limit of its",
         ),
         (of(joint(LoopJointKind::Revolute).with_limits([-4.0, 4.0])), "the range of its limits is 8"),
+        (
+            of(joint(LoopJointKind::Spring).with_dof(spring(-1.0))),
+            "the length of its spring is -1; it must be at least 0",
+        ),
+        (of(joint(LoopJointKind::Spherical).with_cone(f64::INFINITY)), "the cone is inf; it must be finite"),
+        (of(joint(LoopJointKind::Spherical).with_twist_limits([1e300; 2])), "a limit of the twist is 1"),
+        (of(pulley.with_transmission(|t| t.ratio = 0.1)), "the lower limit of its length is 9"),
         (of(joint(LoopJointKind::Fixed).with_breaking_force(0.0)), "the breaking force is 0; it must be above 0"),
         (of(joint(LoopJointKind::Fixed).with_breaking_torque(f64::NAN)), "the breaking torque is NaN"),
     ] {

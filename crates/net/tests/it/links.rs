@@ -97,4 +97,11 @@ fn links_with_a_name_that_is_taken_have_numbers() {
     let mut world = World::default();
     world.add(leg("x", ["", "1", "2"])).unwrap();
     assert_eq!(names(&world), ["x/0", "x/1", "x/2"], "one has no name");
+    // bodies have the names and the numbers
+    let mut world = World::default();
+    world.add(leg("x", ["s", "t", "u"])).unwrap();
+    for name in ["x/u", "x/1"] {
+        world.add(RigidBody::new(Shape::sphere(0.1).unwrap()).with_name(name)).unwrap();
+    }
+    assert_eq!(names(&world), ["x/#0", "x/#1", "x/#2", "x/u", "x/1"]);
 }

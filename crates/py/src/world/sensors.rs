@@ -11,12 +11,14 @@ use crate::world::inner::Inner;
 use crate::world::joints;
 use crate::world::query::Numbering;
 use crate::world::shared::Shared;
+use nalgebra::Translation3;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{
-    Anchor, ArticulatedBody, ObjectId, Optics, Sensor as Core, SensorImage, SensorKind, SensorNoise, SensorPlace,
+    Anchor, ArticulatedBody, ObjectId, Optics, RigidBody as Rigid, Sensor as Core, SensorImage, SensorKind,
+    SensorNoise, SensorPlace,
 };
 
 /// The arguments of ``add_sensor``.
@@ -119,7 +121,12 @@ fn link<'a>(inner: &'a Inner, target: &'a Target) -> Result<Option<(&'a Articula
 fn anchor(inner: &Inner, target: &Target, site: &Pose) -> Result<Anchor> {
     match link(inner, target)? {
         Some((body, link)) => body.anchor(target.id, link, site).map_err(|e| Error::Name(e.to_string())),
-        None => Ok(Anchor::on(target.id, 0, *site)),
+        None => {
+            // the frame of a body is that of its shape
+            let center = inner.world.get::<Rigid>(target.id).map(|body| body.shape().center_of_mass());
+            let shift = Translation3::from(-center.unwrap_or_default());
+            Ok(Anchor::on(target.id, 0, shift * site))
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Measuring sensors of a scene.
 
 use tumble_core::collide::{Pose, Shape};
-use tumble_core::{Anchor, ArticulatedBody, ObjectId, Sensor, SensorPlace, World};
+use tumble_core::{Anchor, ArticulatedBody, ObjectId, RigidBody, Sensor, SensorPlace, World};
 
 use super::error::BuildError;
 use super::shapes;
@@ -49,7 +49,10 @@ impl SceneFile {
     /// Returns a frame of a body or of a link, which may be a fixed one, in the world.
     fn anchor(&self, world: &World, part: &PartSpec, pose: &Pose) -> Option<Anchor> {
         match *part {
-            PartSpec::Body(body) => Some(Anchor::on(world.find(&self.bodies[body].name)?, 0, *pose)),
+            PartSpec::Body(body) => {
+                let id = world.find(&self.bodies[body].name)?;
+                Some(Anchor::on(id, 0, frame_of_body(world, id) * pose))
+            }
             PartSpec::Link(spec, link) => {
                 let spec = &self.articulated[spec];
                 let id = world.find(&spec.name)?;
@@ -67,4 +70,10 @@ impl SceneFile {
         let moving = &body.model().links()[body.model().link(&spec.links[link].name)?];
         (moving.joint.dof() == 1).then_some((id, moving.v))
     }
+}
+
+/// Returns the frame of a rigid body, that of its shape, in the one about its center of mass.
+pub(super) fn frame_of_body(world: &World, id: ObjectId) -> Pose {
+    let center = world.get::<RigidBody>(id).map(|body| body.shape().center_of_mass());
+    Pose::from_parts((-center.unwrap_or_default()).into(), nalgebra::one())
 }

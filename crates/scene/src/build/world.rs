@@ -11,6 +11,7 @@ use tumble_core::{
 use crate::build::appearance::{appearance, material_id};
 use crate::build::articulated;
 use crate::build::error::BuildError;
+use crate::build::sensor::frame_of_body;
 use crate::build::shapes::{self, Purpose, ShapeMaker};
 use crate::notes::Notes;
 use crate::parse::articulated::ArticulatedSpec;
@@ -147,10 +148,7 @@ impl SceneFile {
     /// Returns the pose of the frame of a body or link in that of its part.
     fn frame_in_part(&self, world: &World, part: &PartSpec) -> Pose {
         let in_part = match *part {
-            PartSpec::Body(body) => world.find(&self.bodies[body].name).and_then(|id| {
-                let center = world.get::<RigidBody>(id)?.shape().center_of_mass();
-                Some(Pose::from_parts((-center).into(), nalgebra::one()))
-            }),
+            PartSpec::Body(body) => world.find(&self.bodies[body].name).map(|id| frame_of_body(world, id)),
             PartSpec::Link(spec, link) => world.find(&self.articulated[spec].name).and_then(|id| {
                 let model = world.get::<ArticulatedBody>(id)?.model();
                 Some(model.frame(&self.articulated[spec].links[link].name)?.pose)

@@ -41,13 +41,9 @@ const FOV_DEG: f64 = 40.0;
 const COLOR: [f64; 3] = [0.78, 0.45, 0.20];
 
 /// Returns a scene with a URDF on a floor through its lowest point. Joints start at 0, or at the
-/// nearest limit if 0 is outside their limits. A robot without movable joints floats.
+/// nearest limit if 0 is outside their limits.
 pub(crate) fn robot(path: &Path, options: &UrdfOptions) -> Result<SceneFile, SceneError> {
-    let mut robot = urdf::read_file(path, options, Content::Body)?;
-    if robot.links.iter().all(|link| link.joint.kind == Joint::Fixed) {
-        robot = urdf::read_file(path, &UrdfOptions { floating: true, ..options.clone() }, Content::Body)?;
-        robot.notes.push("it has no movable joint, so its root link floats".into());
-    }
+    let robot = urdf::read_file(path, options, Content::Body)?;
     let name = if robot.name.is_empty() { stem(path) } else { robot.name };
     let notes = robot.notes;
     let mut spec = ArticulatedSpec { exclude_overlapping: true, notes, ..ArticulatedSpec::of(name, robot.links) };

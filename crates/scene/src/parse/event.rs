@@ -75,10 +75,10 @@ pub(crate) enum ObjectKind {
     Body { mode: Mode, sensor: bool },
     /// An articulated body, and whether a link of it has a sensor.
     Articulated { sensor: bool },
-    /// One of its links, and whether its joint has a drive with a target.
-    Link { driven: bool },
-    /// A loop joint, likewise.
-    Joint { driven: bool },
+    /// One of its links, whether its joint has a drive with a target, and whether that is an angle.
+    Link { driven: bool, turns: bool },
+    /// A loop joint, likewise of its first degree of freedom.
+    Joint { driven: bool, turns: bool },
     /// A coupling of two joints.
     Mimic,
     /// A template, and the number of its bodies.

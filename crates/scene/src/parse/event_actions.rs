@@ -82,8 +82,19 @@ pub(crate) fn read_action(
         }
         "move" => read_move(&mut f, names),
         "drive" => {
-            let right = |kind| matches!(kind, ObjectKind::Link { driven: true } | ObjectKind::Joint { driven: true });
-            let expected = "the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity";
+            let in_degrees = f.value("target_deg").is_some();
+            let right = |kind| match kind {
+                ObjectKind::Link { driven, turns } | ObjectKind::Joint { driven, turns } => {
+                    driven && (turns || !in_degrees)
+                }
+                _ => false,
+            };
+            let expected = match in_degrees {
+                false => "the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity",
+                true => {
+                    "the name of a loop joint, or \"OBJECT/LINK\", that turns and has a `drive`, for a `target_deg`"
+                }
+            };
             let body = names.read(&mut f, "drive", right, expected);
             let target = read_target(&mut f);
             body.map(|body| Action::Drive { body, dof: 0, target, original: None })

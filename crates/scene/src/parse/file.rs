@@ -357,12 +357,13 @@ fn object_names(
         names.add(&spec.name, ObjectKind::Articulated { sensor });
         for link in &spec.links {
             let driven = link.joint.is_single() && has_target(&link.joint.dof.drive);
-            names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link { driven });
+            let turns = matches!(link.joint.kind, Joint::Revolute { .. });
+            names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link { driven, turns });
         }
     }
     for joint in loop_joints {
         let driven = joint.dofs.first().is_some_and(|dof| has_target(&dof.settings.drive));
-        names.add(&joint.name, ObjectKind::Joint { driven });
+        names.add(&joint.name, ObjectKind::Joint { driven, turns: joint.kind.turns() });
     }
     mimics.iter().for_each(|mimic| names.add(&mimic.name, ObjectKind::Mimic));
     templates.iter().for_each(|template| names.add_template(&template.body.name, template.count));

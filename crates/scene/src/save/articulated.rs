@@ -1,5 +1,4 @@
-//! `[[articulated]]` of an articulated body as it stands. Shapes of links that are folded into others are those of the
-//! moving link that carries them.
+//! `[[articulated]]` of an articulated body as it stands, with the shapes and masses of each link, fixed ones too.
 
 use tumble_core::articulated::{DofSettings, Drive, Link, LinkFrame, LinkMass};
 use tumble_core::collide::{ContactMode, Pose, Shape, Vec3};

@@ -44,6 +44,12 @@ impl Writer<'_> {
             return self.fault(format!("\"{name}\", an event of an object that was removed"));
         };
         t.put("when", when);
+        let of_a_joint = |body: &ObjectId| self.world.get::<ArticulatedBody>(*body).is_none();
+        let beyond = |action: &Action| matches!(action, Action::Drive { body, dof: 1.., .. } if of_a_joint(body));
+        if event.actions().iter().any(beyond) {
+            let what = "an event that drives another degree of freedom of a loop joint than the first one";
+            return self.fault(format!("\"{name}\", {what}"));
+        }
         let deeds: Option<Vec<Table>> = event.actions().iter().map(|action| self.action(action)).collect();
         match deeds {
             Some(deeds) => t.put("do", deeds),
@@ -194,7 +200,7 @@ impl Writer<'_> {
                 None
             }
             SensorPlace::Site(anchor) => {
-                let (part, frame) = self.site(anchor);
+                let (part, frame) = self.anchor(anchor);
                 t.put_pose(&frame);
                 part
             }
@@ -203,7 +209,7 @@ impl Writer<'_> {
         };
         on.iter().for_each(|on| t.put("on", on));
         if let Some(reference) = sensor.reference() {
-            self.site(reference).0.iter().for_each(|part| t.put("relative_to", part));
+            self.anchor(reference).0.iter().for_each(|part| t.put("relative_to", part));
         }
         if let Some(volume) = sensor.volume() {
             t.put("volume", self.meshes.shape(volume));
@@ -221,14 +227,6 @@ impl Writer<'_> {
         t.put_unless(0, "seed", noise.seed);
         t.put_unless(true, "enabled", enabled);
         self.out += &t.under("[[sensor]]");
-    }
-
-    /// Returns the name of the part of a site, and its frame; a frame of a rigid body is one of its part.
-    fn site(&mut self, anchor: &Anchor) -> (Option<String>, tumble_core::collide::Pose) {
-        match anchor.part.map(|(id, _)| (id, self.world.get::<RigidBody>(id).is_some())) {
-            Some((id, true)) => (self.world.name(id).map(str::to_owned), anchor.frame),
-            _ => self.anchor(anchor),
-        }
     }
 }
 

@@ -100,7 +100,8 @@ impl SceneFile {
     fn has_objects_of(&self, other: &SceneFile) -> bool {
         (&self.meshes, &self.bodies, &self.articulated) == (&other.meshes, &other.bodies, &other.articulated)
             && (&self.loop_joints, &self.pairs, &self.materials) == (&other.loop_joints, &other.pairs, &other.materials)
-            && self.mimics == other.mimics
+            && (&self.mimics, &self.sensors, &self.events) == (&other.mimics, &other.sensors, &other.events)
+            && (&self.templates, &self.behaviors) == (&other.templates, &other.behaviors)
     }
 }
 

@@ -81,6 +81,22 @@ fn the_floor_goes_through_the_lowest_point_of_a_robot_within_its_limits() {
     assert!(!SceneFile::load_with(&path, &options).unwrap().has_fixed_base());
 }
 
+/// A table of one link stands where it is, also without a mass.
+#[test]
+fn a_robot_without_movable_joints_is_static() {
+    let folder = Folder::new("table");
+    let top = "<collision><origin xyz=\"0 0 0.5\"/><geometry><box size=\"1 1 0.1\"/></geometry></collision>";
+    for table in [link("top", top), format!("<link name=\"top\">{top}</link>")] {
+        let path = folder.write("t.urdf", &format!("<robot name=\"table\">{table}</robot>"));
+        let scene = SceneFile::load(&path).unwrap();
+        assert!(scene.has_fixed_base());
+        let (mut world, _) = scene.build().unwrap();
+        let before = world.pose(world.find("table").unwrap(), 0).unwrap();
+        (0..60).for_each(|_| drop(world.step().unwrap()));
+        assert_eq!(world.pose(world.find("table").unwrap(), 0).unwrap(), before);
+    }
+}
+
 #[test]
 fn the_camera_frames_what_stands_there() {
     let folder = Folder::new("camera");

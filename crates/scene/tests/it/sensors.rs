@@ -144,6 +144,27 @@ fn sensors_of_a_scene_read_what_holds_its_bodies() {
     assert!(reading(&world, "angle")[0].abs() <= 0.2);
 }
 
+/// The frame of a body is that of its shape, not the one about its center of mass.
+#[test]
+fn sites_on_a_body_are_in_the_frame_of_its_shape() {
+    let text = "[world]\ngravity_m_per_s2 = [0, 0, 0]\n[[body]]\nname = \"b\"\nmass_kg = 2\nposition_m = [1, 2, 3]\n\
+        shape = { type = \"compound\", parts = [{ type = \"sphere\", radius_m = 0.1 }, \
+        { type = \"sphere\", radius_m = 0.1, position_m = [1, 0, 0] }] }\n\
+        [[sensor]]\nname = \"at\"\ntype = \"position\"\non = \"b\"\nposition_m = [0, 0, 0.5]\n";
+    let scene = SceneFile::parse(text, "s.toml").unwrap();
+    let (mut world, _) = scene.build().unwrap();
+    world.step().unwrap();
+    close(&reading(&world, "at"), &[1.0, 2.0, 3.5], 1e-12, "at");
+    // and so they are written
+    let folder = std::env::temp_dir().join(format!("tumble-scene-{}-sites", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("scene.toml");
+    tumble_scene::SceneWriter::new(&world).save(&file).unwrap();
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(text.contains("position_m = [0.0, 0.0, 0.5]") || text.contains("position_m = [0, 0, 0.5]"), "{text}");
+}
+
 #[test]
 fn faults_of_sensors_are_reported_with_their_place() {
     let fault = |sensor: &str| {

@@ -10,10 +10,14 @@ impl LoopJoint {
     /// one follows them: its rope is taut in the poses in which it was made.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a constant out of its range.
+    /// [`LoopJointError::Range`] for a constant out of its range, and for limits that exclude the length of a pulley that
+    /// follows them.
     pub fn set_transmission(&mut self, transmission: Transmission) -> Result<(), LoopJointError> {
         if let Some((what, value, expected)) = transmission.range_error() {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
+        }
+        if let (None, Some(limits)) = (self.length, self.dof().limits) {
+            self.check_limits(limits, transmission.rope_length())?;
         }
         self.transmission = transmission;
         Ok(())
@@ -86,6 +90,9 @@ impl LoopJoint {
             (LoopJointKind::Spring, Some(spring)) => spring.rest,
             _ => self.length(),
         };
+        if self.kind == LoopJointKind::Spring {
+            self.check("the length of its spring", own, own >= 0.0, "at least 0")?;
+        }
         if let Some(limits) = dof.limits {
             self.check_limits(limits, own)?;
         }
@@ -143,7 +150,7 @@ impl LoopJoint {
             return Err(self.wrong_kind("cone"));
         }
         let angle = cone.unwrap_or(0.0);
-        self.check("the cone", angle, angle >= 0.0, "at least 0 rad")?;
+        self.check("the cone", angle, angle.is_finite() && angle >= 0.0, "finite and at least 0 rad")?;
         self.cone = cone;
         Ok(())
     }
@@ -161,6 +168,8 @@ impl LoopJoint {
         if let Some([lo, hi]) = limits {
             self.check("the lower limit of the twist", lo, lo <= hi, "a number that is not above the upper limit")?;
             self.check("the range of its twist", hi - lo, hi - lo <= WIDE, "at most 3π/2")?;
+            let far = lo.abs().max(hi.abs());
+            self.check("a limit of the twist", far, far <= TAU, "within 2π of 0")?;
         }
         self.twist_limits = limits;
         Ok(())
