@@ -15,7 +15,6 @@ fn table() -> Vec<(&'static str, String, Vec<&'static str>)> {
         ("zero mass", bare("shape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 0"), vec![":4:", "mass_kg", "0"]),
         ("negative mass", bare("shape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = -1.0"), vec![":4:", "mass_kg", "-1"]),
         ("NaN mass", bare("shape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = nan"), vec![":4:", "mass_kg"]),
-        ("no mass", bare("shape = { type = \"sphere\", radius_m = 0.1 }"), vec!["mass"]),
         ("infinite position", scene("position_m = [0, inf, 0]", ""), vec![":8:", "position_m"]),
         ("NaN velocity", scene("velocity_m_per_s = [nan, 0, 0]", ""), vec![":8:", "velocity_m_per_s"]),
         ("wrong type", scene("friction = \"much\"", ""), vec![":8:", "friction", "a string", "0 to 100"]),
