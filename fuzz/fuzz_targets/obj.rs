@@ -1,4 +1,4 @@
-//! An OBJ mesh: read, checked, repaired, its hull and the solid below it; if the result is a small solid, measured.
+//! An OBJ mesh: read, checked, repaired, its hull, the solid below it and the one behind it; if the result is a small solid, measured.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -20,6 +20,11 @@ fuzz_target!(|text: &str| {
     }
     if let Ok(mut solid) = mesh.terrain(None) {
         let _ = solid.check_closed();
+    }
+    for centered in [false, true] {
+        if let Ok(mut walls) = mesh.thickened(None, centered) {
+            let _ = walls.check_closed();
+        }
     }
     if mesh.check_closed().is_ok() {
         let _ = mesh.mass_properties(1.0);

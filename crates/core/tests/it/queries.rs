@@ -143,7 +143,7 @@ fn overlaps_are_those_of_all_contacts() {
 fn the_nearest_body_of_a_shape_is_the_nearest_of_all() {
     let (world, all) = crowd(60);
     let (mut rng, shapes) = (Rng(7), shapes());
-    for case in 0..2000 {
+    for case in 0..10_000 {
         let (shape, pose) = (&shapes[case % shapes.len()], rng.pose(7.0));
         let found = world.closest_to_shape(shape, &pose, f64::INFINITY, &QueryFilter::default()).unwrap();
         let least = all.iter().filter_map(|(_, other, at)| closest_points(shape, &pose, other, at));
@@ -186,7 +186,7 @@ fn points_are_as_deep_as_in_the_deepest_of_all_bodies() {
 fn a_cast_shape_touches_where_it_stops_and_nothing_before() {
     let (world, all) = crowd(60);
     let (mut rng, shapes, filter, mut met) = (Rng(9), shapes(), QueryFilter::default(), 0);
-    for case in 0..2000 {
+    for case in 0..10_000 {
         let (shape, pose) = (&shapes[case % shapes.len()], rng.pose(9.0));
         let direction = (rng.vector(3.0) - pose.translation.vector).normalize();
         let moved = |t: f64| nalgebra::Translation3::from(direction * t) * pose;
