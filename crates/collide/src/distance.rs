@@ -7,6 +7,8 @@ use crate::{CompoundShape, Contact, Pose, Shape, Vec3, contacts};
 const PROJECTIONS: usize = 16;
 /// Relative margin of a bound.
 const ROUNDING: f64 = 1e-9;
+/// Distance, as a fraction of the smaller radius, below which surfaces with an overlapping contact cross.
+const CROSSING: f64 = 1e-5;
 /// Depth of a contact that can be that of a corner beside a face, in sizes of the smaller body.
 const BESIDE: f64 = 0.02;
 
@@ -164,7 +166,10 @@ pub fn closest_points(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Opt
     let least = found.iter().min_by(|x, y| x.gap.abs().total_cmp(&y.gap.abs()));
     let Some(least) = least else { return start.distance.is_finite().then_some(start) };
     let polished = between(least.point + least.normal * (0.5 * least.gap));
-    Some(if polished.distance <= start.distance { polished } else { start })
+    let nearest = if polished.distance <= start.distance { polished } else { start };
+    // projections between surfaces that cross end at the crossing
+    let deepest = found.iter().filter(|c| c.gap < 0.0).min_by(|x, y| x.gap.total_cmp(&y.gap));
+    Some(deepest.filter(|_| nearest.distance <= CROSSING * size).map_or(nearest, ClosestPair::of))
 }
 
 /// Returns a pair of points of the two surfaces, by alternating projections from a point of A. Its
