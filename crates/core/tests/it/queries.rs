@@ -183,10 +183,12 @@ fn points_are_as_deep_as_in_the_deepest_of_all_bodies() {
 /// A sphere that is cast meets what a ray meets whose targets are larger by its radius; in general
 /// the shape touches at the distance of the hit and overlaps nothing before.
 #[test]
-fn a_cast_shape_touches_where_it_stops_and_nothing_before() {
+fn a_cast_shape_touches_where_it_stops_and_nothing_before_full_length() {
     let (world, all) = crowd(60);
     let (mut rng, shapes, filter, mut met) = (Rng(9), shapes(), QueryFilter::default(), 0);
-    for case in 0..10_000 {
+    // a minute at full length
+    let cases = if std::env::var_os("TUMBLE_SLOW").is_some() { 10_000 } else { 2000 };
+    for case in 0..cases {
         let (shape, pose) = (&shapes[case % shapes.len()], rng.pose(9.0));
         let direction = (rng.vector(3.0) - pose.translation.vector).normalize();
         let moved = |t: f64| nalgebra::Translation3::from(direction * t) * pose;
@@ -198,10 +200,14 @@ fn a_cast_shape_touches_where_it_stops_and_nothing_before() {
         };
         met += 1;
         let there = distance(hit.distance);
-        // distances of cylinders and meshes are those of their contacts; projections between boxes that all but touch
-        // at edges end a millionth of a meter too early
+        // distances of cylinders and meshes are those of their contacts; two boxes that all but touch at edges
+        // have a distance that is too large
         let of_other = all.iter().position(|(id, _, _)| *id == hit.id).unwrap() % 5;
-        let exact = if case % 5 > 2 || of_other > 2 { 5e-5 } else { 1e-6 };
+        let exact = match (case % 5, of_other) {
+            (3.., _) | (_, 3..) => 5e-5,
+            (1, 1) => 2e-5,
+            _ => 1e-8,
+        };
         assert!(
             if hit.distance == 0.0 { there < 1e-8 } else { there > -exact && there < 2e-2 },
             "case {case}: {there}"

@@ -157,7 +157,7 @@ impl World {
     /// it overlaps at the start is hit at distance 0. `max_distance` is finite.
     ///
     /// The shape advances by conservative steps until the gap is below 1e-9 of the smaller bounding
-    /// radius; boxes that meet at edges can overlap by 1e-6 m, and with cylinders and meshes it can be some 1e-5 m, the error of their distances
+    /// radius; boxes that meet at edges, and cylinders and meshes, can overlap by some 1e-5 m, the error of their distances
     /// ([`closest_points`]). A shape that passes a
     /// cylinder or a mesh at less than a thousandth of its way counts as touching.
     pub fn cast_shape(
