@@ -31,7 +31,7 @@ const SENT: usize = 20;
 /// use tumble_core::Appearance;
 /// let appearance = Appearance { color: [0.35, 0.32, 0.3], ..Appearance::default() };
 /// let look = ParticleLook { appearance, radius: Some(0.09), scale: [1.0, 5.0], opacity: Some([0.2, 0.0]), ..ParticleLook::default() };
-/// let settings = ParticleSettings { gravity_scale: -0.11, linear_drag: 0.9, collides: false, ..ParticleSettings::default() };
+/// let settings = ParticleSettings { gravity_scale: -0.11, linear_drag: 0.9, collidable: false, ..ParticleSettings::default() };
 /// world.add(ParticleSystem::new("smoke", settings)?.with_look(look)?)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -1,4 +1,4 @@
-//! What an articulated body of a world has like a rigid one: mode, switches, sleep, collision filter and contacts.
+//! The status of an articulated body of a world, as of a rigid one: mode, switches, sleep, collision filter and contacts.
 
 use crate::arrays::convert::whole_number;
 use crate::choices::{MODES, meaning, word};

@@ -71,7 +71,7 @@ impl Writer<'_> {
         true
     }
 
-    /// Returns what tells an object from one that is enabled.
+    /// Returns the keys of an object that is not enabled.
     fn enabled(&mut self, id: ObjectId) -> Table {
         let mut t = Table::default();
         let status = self.world.status(id);
@@ -83,7 +83,7 @@ impl Writer<'_> {
         t
     }
 
-    /// Returns what tells an object from one that is enabled and collides.
+    /// Returns the keys of an object that is not enabled or does not collide.
     fn status(&self, id: ObjectId) -> Table {
         let mut t = Table::default();
         if let Some(status) = self.world.status(id) {

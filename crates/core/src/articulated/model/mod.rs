@@ -185,7 +185,7 @@ pub struct LinkFrame {
     pub mass: LinkMass,
 }
 
-/// Tells whether the inertias of two models are the same ones: each change makes another one.
+/// Identity of the inertias of a model: each change makes another one.
 #[derive(Clone, Debug, Default)]
 pub(in crate::articulated) struct Inertias(Arc<()>);
 
