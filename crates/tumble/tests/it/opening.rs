@@ -55,8 +55,8 @@ fn a_root_that_floats_falls_as_free_bodies_do() {
     let fall = summary(&folder, &[&path, "--floating", "--duration", "0.5"]);
     let speed = 9.81 * 0.5;
     assert!((fall["end"]["kinetic_energy_j"].as_f64().unwrap() - 0.5 * speed * speed).abs() < 1e-9, "{fall}");
-    // a robot without joints floats by default
-    assert!(succeed(&["check", &path]).contains("6 degrees of freedom on a floating base"));
+    // a robot without joints is fixed by default, like any other
+    assert!(succeed(&["check", &path]).contains("0 degrees of freedom on a fixed base"));
     let path = folder.write("p.urdf", pendulum("visual"));
     assert!(succeed(&["check", &path]).contains("1 degrees of freedom on a fixed base"));
     let mass = "<inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>";
