@@ -3,7 +3,8 @@
 //! Each half-edge is paired with one of the same edge in the opposite direction. A half-edge
 //! without partner is a boundary edge. If more than two faces meet at an edge, half-edges of the
 //! same sheet (faces connected across edges with two faces) are paired first, then those of the
-//! larger sheets. So the half-edges of fins and inner walls stay unpaired. The corners of faces
+//! larger sheets ([`Pairing::of`]), so the half-edges of fins and inner walls stay unpaired; or those whose
+//! faces are most nearly in one plane ([`Pairing::flattest`]). The corners of faces
 //! that are connected by pairs form fans. At an open fan exactly one boundary edge enters and one
 //! leaves, so the boundary edges form unique loops.
 
