@@ -19,6 +19,16 @@ pub struct Aabb {
 }
 
 impl Aabb {
+    /// Returns the distance of two boxes, meters; 0 if they overlap.
+    pub fn distance(&self, other: &Aabb) -> f64 {
+        (self.min - other.max).sup(&(other.min - self.max)).sup(&Vec3::zeros()).norm()
+    }
+
+    /// Returns the box around two boxes.
+    pub fn merged(&self, other: &Aabb) -> Aabb {
+        Aabb { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
+    }
+
     /// Returns whether the two boxes share a point; touching counts.
     pub fn overlaps(&self, other: &Aabb) -> bool {
         (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])

@@ -87,6 +87,16 @@ impl MeshDistance {
         ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
     }
 
+    /// Returns the tree of boxes around the pieces of the boundary.
+    pub(crate) fn tree(&self) -> &AabbTree {
+        &self.tree
+    }
+
+    /// Returns the corners of a piece of the boundary, by its number in the leaves.
+    pub(crate) fn piece(&self, n: usize) -> [Vec3; 3] {
+        self.corners[n]
+    }
+
     /// Calls `each` for every triangle within `radius` meters of `p`, with its index, its closest
     /// point and the feature of that point (see [`closest_on_triangle`]).
     pub(crate) fn within(&self, p: &Vec3, radius: f64, each: &mut dyn FnMut(usize, Vec3, usize)) {

@@ -157,9 +157,8 @@ impl World {
     /// it overlaps at the start is hit at distance 0. `max_distance` is finite.
     ///
     /// The shape advances by conservative steps until the gap is below 1e-9 of the smaller bounding
-    /// radius; boxes that meet at edges, and cylinders and meshes, can overlap by some 1e-5 m, the error of their distances
-    /// ([`closest_points`]). A shape that passes a
-    /// cylinder or a mesh at less than a thousandth of its way counts as touching.
+    /// radius. A shape that passes a mesh with concave edges, or a compound, at less than a thousandth of its way
+    /// counts as touching.
     pub fn cast_shape(
         &self,
         shape: &Shape,
@@ -185,11 +184,12 @@ impl World {
 }
 
 /// Advances a shape along a unit direction until it touches a part. The distance of convex shapes
-/// with exact normals closes along the normal of their closest points at most; that of others along
+/// closes along the normal of their closest points at most; that of others along
 /// the direction. A step that went too far by the error of a distance is halved.
 fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>) -> Option<ShapeCastHit> {
-    let exact = |shape: &Shape| !(shape.has_tree() || matches!(shape, Shape::Compound(_)));
-    let by_normal = exact(shape) && exact(part.shape);
+    let convex = |shape: &Shape| shape.has_convex_parts() && !matches!(shape, Shape::Compound(_));
+    let plane = matches!(shape, Shape::HalfSpace) || matches!(part.shape, Shape::HalfSpace);
+    let by_normal = plane || convex(shape) && convex(part.shape);
     let met = MET * shape.bounding_radius().min(part.shape.bounding_radius()).min(1e9);
     let (mut clear, mut distance) = (0.0, 0.0);
     for advance in 1.. {
@@ -228,7 +228,7 @@ fn nearest<'w>(
 ) {
     let bounds = shape.tight_aabb(pose);
     for part in parts {
-        let least = distance_of_boxes(&bounds, &part.shape.tight_aabb(&part.pose));
+        let least = bounds.distance(&part.shape.tight_aabb(&part.pose));
         if least > 0.0 && best.is_some_and(|best| least > best.distance) {
             continue;
         }
@@ -243,10 +243,6 @@ fn nearest<'w>(
 
 fn moved(pose: &Pose, by: &Vec3) -> Pose {
     nalgebra::Translation3::from(*by) * pose
-}
-
-fn distance_of_boxes(a: &Aabb, b: &Aabb) -> f64 {
-    (a.min - b.max).sup(&(b.min - a.max)).sup(&Vec3::zeros()).norm()
 }
 
 fn distance_to_box(b: &Aabb, point: &Vec3) -> f64 {
