@@ -286,5 +286,6 @@ fn the_depth_of_boxes_is_the_least_translation_over_all_axes() {
         worst = worst.max(-pair.distance / least - 1.0);
     }
     println!("{overlapping} overlap, {longer} have a longer translation, by {worst} at most");
-    assert!(overlapping > 5000, "{overlapping}");
+    // the normal of no contact leads to the least one of all in some cases
+    assert!(overlapping > 5000 && longer < overlapping / 10 && worst < 0.06, "{overlapping} {longer} {worst}");
 }
