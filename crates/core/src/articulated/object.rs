@@ -143,7 +143,7 @@ impl Integratable for ArticulatedBody {
             let pose = &view.part_states[me.parts.start + i].pose;
             wrench.torque += (pose.rotation * link.mass.center).cross(&weight);
         }
-        self.joint_forces(&view.x[me.x.clone()], view.implicit, &mut out.generalized[me.v.clone()]);
+        self.joint_forces(&view.x[me.x.clone()], view.implicit, view.time, &mut out.generalized[me.v.clone()]);
     }
 
     fn derivative(&self, cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {

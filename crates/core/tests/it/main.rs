@@ -23,6 +23,7 @@ mod articulated_swings;
 mod articulated_world;
 mod articulation_builder;
 mod assemblies;
+mod ball_joints;
 mod body_constants;
 mod budget;
 mod cameras;

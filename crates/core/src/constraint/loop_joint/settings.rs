@@ -3,6 +3,7 @@
 use super::turns::WIDE;
 use super::{LoopJoint, LoopJointError, LoopJointKind, Transmission};
 use crate::articulated::DofSettings;
+use crate::articulated::twist_fault;
 use std::f64::consts::TAU;
 
 impl LoopJoint {
@@ -165,11 +166,8 @@ impl LoopJoint {
         if self.kind != LoopJointKind::Spherical && limits.is_some() {
             return Err(self.wrong_kind("twist"));
         }
-        if let Some([lo, hi]) = limits {
-            self.check("the lower limit of the twist", lo, lo <= hi, "a number that is not above the upper limit")?;
-            self.check("the range of its twist", hi - lo, hi - lo <= WIDE, "at most 3π/2")?;
-            let far = lo.abs().max(hi.abs());
-            self.check("a limit of the twist", far, far <= TAU, "within 2π of 0")?;
+        if let Some((what, value, expected)) = limits.and_then(twist_fault) {
+            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
         }
         self.twist_limits = limits;
         Ok(())

@@ -21,7 +21,7 @@ use crate::world::view::{ObjectId, WorldView};
 use std::f64::consts::TAU;
 
 /// Distance of two limits above which the angle is followed, rad.
-pub(super) const WIDE: f64 = 0.75 * TAU;
+pub(crate) const WIDE: f64 = 0.75 * TAU;
 
 impl LoopJoint {
     /// Returns whether its angle is a number of the state.
