@@ -326,6 +326,11 @@ impl LinkBuilder {
         self
     }
 
+    /// Returns the settings of its joint: of all degrees of freedom without settings of their own.
+    pub fn dof(&self) -> &DofSettings {
+        &self.dof
+    }
+
     /// Returns its name.
     pub fn name(&self) -> &str {
         &self.name

@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
     Anchor, ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId,
-    PairMaterial, PairSide, RigidBody, Settings, Sleep, Template, Visual, World, WorldError,
+    PairMaterial, PairSide, RigidBody, Settings, ShapeFilter, Sleep, Template, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -263,6 +263,8 @@ impl SceneFile {
         (body.gravity_scale, body.locked) = (spec.gravity_scale, spec.locked);
         (body.group, body.mask, body.sensor) = (spec.group, spec.mask, spec.sensor);
         body.one_way = spec.one_way.map(Vec3::from);
+        let whole = ShapeFilter { group: spec.group, mask: spec.mask, sensor: spec.sensor };
+        shapes::own_filters(&spec.shape, whole).for_each(|(n, own)| body.set_shape_filter(n, Some(own)));
         Ok(body)
     }
 

@@ -1,11 +1,13 @@
 //! The joint of a link: its type, initial state, limits, damping, friction, spring and drive. Keys
 //! have units, so those of a revolute joint differ from those of a prismatic one.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use nalgebra::Quaternion;
 use tumble_core::Joint;
 use tumble_core::articulated::{DofSettings, Drive, Playback, Spring};
-use tumble_core::collide::Vec3;
+use tumble_core::collide::{Quat, Vec3};
 
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value};
@@ -21,8 +23,10 @@ pub struct JointSpec {
     pub name: String,
     /// The type of joint; its axis has unit length.
     pub kind: Joint,
-    /// Settings of each of its degrees of freedom.
+    /// Settings of each of its degrees of freedom, of those without settings in `dofs`.
     pub dof: DofSettings,
+    /// Settings of the three degrees of freedom of a spherical joint, if they differ; otherwise empty.
+    pub dofs: Vec<DofSettings>,
     /// The joint whose position this one follows.
     pub mimic: Option<MimicSpec>,
     /// Position numbers at time 0, as defined by [`Joint`].
@@ -31,12 +35,16 @@ pub struct JointSpec {
     pub velocity: Vec<f64>,
     /// Cone of a spherical joint: 0, 1 or 2 for axis x, y or z of its frame, and half angle, rad.
     pub cone: Option<(usize, f64)>,
+    /// Limits of the twist of a spherical joint: 0, 1 or 2 for axis x, y or z of the link, and the limits, rad.
+    pub twist_limits: Option<(usize, [f64; 2])>,
     /// Inertia of its rotor, kg·m² or kg, at least 0; 0 unless it has one degree of freedom.
     pub armature: f64,
     /// Largest speed that a URDF states, rad/s or m/s. It is the velocity limit if its options ask for that.
     pub speed: Option<f64>,
     /// Whether a position drive without a target holds the initial position.
     pub(crate) holds_start: bool,
+    /// The same of each of `dofs`.
+    pub(crate) dofs_hold_start: Vec<bool>,
 }
 
 /// `q = multiplier·q_of + offset`.
@@ -146,13 +154,16 @@ impl JointSpec {
             name: name.into(),
             kind,
             dof,
+            dofs: Vec::new(),
             mimic: None,
             position,
             velocity,
             cone: None,
+            twist_limits: None,
             armature: 0.0,
             speed: None,
             holds_start: false,
+            dofs_hold_start: Vec::new(),
         }
     }
 
@@ -186,10 +197,11 @@ impl JointSpec {
         let keys = self.keys();
         match self.kind {
             Joint::Spherical => {
-                self.read_resistance(f, keys);
+                self.read_settings(f, true);
                 self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
-                self.read_own_cone(f);
+                self.read_swing_and_twist(f);
                 self.read_spherical_start(f);
+                self.read_own_dofs(f);
             }
             _ if self.is_single() => {
                 if let Some(position) = number(f, keys.start) {
@@ -219,10 +231,14 @@ impl JointSpec {
         self.read_settings(f, springs);
     }
 
-    /// Reads the cone of a spherical joint of a link, and its axis.
-    fn read_own_cone(&mut self, f: &mut Fields<'_>) {
+    /// Reads the cone of a spherical joint of a link, the limits of its twist, and the axis of both.
+    fn read_swing_and_twist(&mut self, f: &mut Fields<'_>) {
         const EXPECTED: &str = "an axis of the joint's frame: [1, 0, 0], [0, 1, 0] or [0, 0, 1]";
-        let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) else { return };
+        let cone = number(f, ("cone_rad", Some("cone_deg")));
+        let twist = read_limits(f, ("twist_limits_rad", Some("twist_limits_deg")));
+        if cone.is_none() && twist.is_none() {
+            return;
+        }
         let mut axis = 2;
         if let Some(value) = f.value("axis") {
             let problems = f.log.count();
@@ -234,14 +250,36 @@ impl JointSpec {
                 _ => {}
             }
         }
-        self.cone = Some((axis, cone));
+        self.cone = cone.map(|cone| (axis, cone)).or(self.cone);
+        if let Some(limits) = twist {
+            self.twist_limits = limits.map(|limits| (axis, limits));
+        }
+        check_twist(f);
+    }
+
+    /// Reads the tables `dof` of a spherical joint of a link, each with settings of one degree of freedom.
+    fn read_own_dofs(&mut self, f: &mut Fields<'_>) {
+        let tables = f.tables("dof", self.kind.dof());
+        if tables.is_empty() {
+            return;
+        }
+        let common = JointSpec { dofs: Vec::new(), ..self.clone() };
+        let mut joints = vec![common; self.kind.dof()];
+        for (joint, mut table) in joints.iter_mut().zip(tables) {
+            joint.read_settings(&mut table, true);
+            table.finish();
+        }
+        self.dofs_hold_start = joints.iter().map(|joint| joint.holds_start).collect();
+        self.dofs = joints.into_iter().map(|joint| joint.dof).collect();
     }
 
     /// Returns the settings of each of its degrees of freedom.
     pub(crate) fn dofs(&self) -> Vec<DofSettings> {
         let of = |k: usize| {
+            let own = self.dofs.get(k).unwrap_or(&self.dof);
             let cone = self.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
-            DofSettings { limits: self.dof.limits.or(cone), ..self.dof.clone() }
+            let twist_limits = self.twist_limits.filter(|(axis, _)| *axis == k).map(|(_, limits)| limits);
+            DofSettings { limits: own.limits.or(cone), twist_limits, ..own.clone() }
         };
         (0..self.kind.dof()).map(of).collect()
     }
@@ -336,12 +374,53 @@ impl JointSpec {
         number(f, self.keys().offset).unwrap_or(0.0)
     }
 
-    /// Sets the target of a position drive without a target to the position at time 0.
+    /// Sets the target of a position drive without a target to the position at time 0, of a spherical joint to the rotation vector.
     pub(crate) fn settle(&mut self) {
+        if self.kind == Joint::Spherical {
+            return self.settle_rotation();
+        }
         if let (true, Drive::Position { target, .. }, Some(start)) =
             (self.holds_start, &mut self.dof.drive, self.position.first())
         {
             *target = *start;
+        }
+    }
+}
+
+impl JointSpec {
+    fn settle_rotation(&mut self) {
+        let holds = |k: usize| self.dofs_hold_start.get(k).copied().unwrap_or(self.holds_start);
+        if !(0..3).any(holds) {
+            return;
+        }
+        let start = match self.position[..] {
+            [x, y, z, w] => Quat::new_normalize(Quaternion::new(w, x, y, z)).scaled_axis(),
+            _ => Vec3::zeros(),
+        };
+        if self.dofs.is_empty() {
+            self.dofs = vec![self.dof.clone(); 3];
+        }
+        for (k, holds) in [0, 1, 2].map(|k| (k, holds(k))) {
+            if let (true, Drive::Position { target, .. }) = (holds, &mut self.dofs[k].drive) {
+                *target = start[k];
+            }
+        }
+    }
+}
+
+/// Reports limits of a twist that no spherical joint can have.
+pub(crate) fn check_twist(f: &mut Fields<'_>) {
+    const EXPECTED: &str = "[lower, upper], at most 3π/2 (270°) apart and within 2π (360°) of 0; or false for none";
+    for (key, turn) in [("twist_limits_rad", TAU), ("twist_limits_deg", 360.0)] {
+        let problems = f.log.count();
+        let Some(value) = f.value(key) else { continue };
+        if value.get_ref().as_bool() == Some(false) {
+            continue;
+        }
+        let [lower, upper]: [f64; 2] = f.as_vector(key, value, Bound::LIMIT);
+        let fine = upper - lower <= 0.75 * turn && lower.abs().max(upper.abs()) <= turn;
+        if f.log.count() == problems && lower <= upper && !fine {
+            f.wrong(key, value, EXPECTED);
         }
     }
 }

@@ -148,14 +148,15 @@ impl MjcfWriter<'_> {
         let dofs = &tree.body.dofs()[link.v..link.v + link.joint.dof()];
         let Some(dof) = dofs.first() else { return };
         let spherical = link.joint == Joint::Spherical;
-        if spherical && dofs.iter().any(|other| other.limits.is_some()) {
-            self.note(&link.name, "cones of spherical joints are left out");
-        }
-        let free = |dof: &DofSettings| DofSettings { limits: dof.limits.filter(|_| !spherical), ..dof.clone() };
+        let range = if spherical { self.ball_range(&link.name, dofs) } else { None };
+        let free = |dof: &DofSettings| match spherical {
+            true => DofSettings { limits: None, twist_limits: None, ..dof.clone() },
+            false => dof.clone(),
+        };
         if dofs.iter().any(|other| free(other) != free(dof)) {
             self.note(
                 &link.name,
-                "different damping or friction of one joint's degrees of freedom: the first is written",
+                "different settings of one joint's degrees of freedom: those of the first are written",
             );
         }
         let mut t = Attributes::of("name", &tree.joints[k]);
@@ -174,6 +175,21 @@ impl MjcfWriter<'_> {
                 t.put("type", "ball");
                 t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
                 t.put_number(0.0, "armature", link.armature);
+                if let Some(spring) = &dof.spring {
+                    t.put_number(0.0, "stiffness", spring.stiffness);
+                    if dofs.iter().any(|dof| dof.spring.is_some_and(|spring| spring.rest != 0.0)) {
+                        self.note(
+                            &link.name,
+                            "rest orientations of spherical joints other than that of the joint are left out",
+                        );
+                    }
+                }
+                if dofs.iter().any(|dof| dof.drive != Drive::None) {
+                    self.note(&link.name, "drives of spherical joints are left out");
+                }
+                if let Some(most) = range {
+                    t.put("range", numbers([0.0, most]));
+                }
                 if at.rotation != nalgebra::one() {
                     self.note(
                         &link.name,
@@ -213,6 +229,29 @@ impl MjcfWriter<'_> {
             self.note(&tree.joints[k], "limits of velocities are left out");
         }
         self.xml.leaf("joint", &t);
+    }
+
+    /// Returns the largest rotation of a spherical joint, rad: that of a cone with limits of the twist that are the same about the same
+    /// axis, as the reader makes them; others are left out.
+    fn ball_range(&mut self, link: &str, dofs: &[DofSettings]) -> Option<f64> {
+        let bounded: Vec<&DofSettings> =
+            dofs.iter().filter(|dof| dof.limits.is_some() || dof.twist_limits.is_some()).collect();
+        let same = |dof: &DofSettings| {
+            let [_, cone] = dof.limits?;
+            (dof.twist_limits.is_none_or(|[lo, hi]| hi == cone && lo == -cone)).then_some(cone)
+        };
+        let range = match bounded[..] {
+            [dof] => same(dof),
+            _ => None,
+        };
+        match range {
+            Some(_) => self.note(link, "the cone and the limits of the twist become a limit of the whole rotation"),
+            None if !bounded.is_empty() => {
+                self.note(link, "cones and limits of the twist of spherical joints are left out")
+            }
+            None => {}
+        }
+        range
     }
 
     /// Writes the shapes of a link or of the base, and frames that are fixed to it.
