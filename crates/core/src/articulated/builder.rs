@@ -166,12 +166,17 @@ impl ArticulationBuilder {
             }
             let [positions, rates] = [link.joint.positions(), link.joint.dof()];
             for (values, index, count, what) in [
-                (&link.positions, q, positions, "its position at time 0 has another count of numbers than its joint"),
+                (
+                    &link.positions,
+                    q,
+                    positions,
+                    "it has a position at time 0 with another count of numbers than its joint",
+                ),
                 (
                     &link.velocities,
                     velocities + v,
                     rates,
-                    "its velocity at time 0 has another count of numbers than its joint",
+                    "it has a velocity at time 0 with another count of numbers than its joint",
                 ),
             ] {
                 let Some(values) = values else { continue };

@@ -92,7 +92,7 @@ impl ArticulationBuilder {
     /// properties of ``RigidBody``. color: sRGB, shape (3,).
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
+        armature=0.0, stiffness=0.0, rest=None, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
         twist_limits=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
@@ -122,7 +122,7 @@ impl ArticulationBuilder {
         joint_friction: f64,
         armature: f64,
         stiffness: f64,
-        rest: &Bound<'_, PyAny>,
+        rest: Option<&Bound<'_, PyAny>>,
         drive: Option<&Bound<'_, PyDict>>,
         max_velocity: Option<f64>,
         effort: Option<f64>,
@@ -333,7 +333,7 @@ impl ArticulationBuilder {
 fn with_force(
     mut link: LinkBuilder,
     count: usize,
-    (stiffness, rest): (f64, &Bound<'_, PyAny>),
+    (stiffness, rest): (f64, Option<&Bound<'_, PyAny>>),
     drive: Option<&Bound<'_, PyDict>>,
     effort: f64,
 ) -> Result<LinkBuilder> {
@@ -343,7 +343,8 @@ fn with_force(
     for k in 0..count {
         let mut dof = common.clone();
         if stiffness != 0.0 {
-            dof.spring = Some(Spring { stiffness, rest: component("rest", rest, k, count)? });
+            let rest = rest.map_or(Ok(0.0), |rest| component("rest", rest, k, count))?;
+            dof.spring = Some(Spring { stiffness, rest });
         }
         if let Some(drive) = drive {
             dof.drive = drive_at(drive, effort, k, count)?;

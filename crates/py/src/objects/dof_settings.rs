@@ -25,7 +25,11 @@ impl DofSpot<'_> {
         self.change(py, |joint| {
             let mut dof = self.k.map_or(Some(joint.dof()), |k| joint.dof_at(k)).cloned().unwrap_or_default();
             change(&mut dof)?;
-            Ok(self.k.map_or_else(|| joint.set_dof(dof.clone()), |k| joint.set_dof_at(k, dof.clone()))?)
+            match self.k {
+                Some(k) => joint.set_dof_at(k, dof)?,
+                None => joint.set_dof(dof)?,
+            }
+            Ok(())
         })
     }
 

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tumble::collide::{Pose, Shape as Solid};
 use tumble::dynamics::archive::{open, seal};
-use tumble::dynamics::{ArchiveError, ArticulatedBody, Drive, ObjectId, World as Core};
+use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
