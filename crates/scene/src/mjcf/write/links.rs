@@ -132,7 +132,11 @@ impl MjcfWriter<'_> {
             let below = chain[n + 1..].iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
             self.joint(tree, *joint, &below.inverse());
         }
-        self.inertial(&link.name, &link.mass);
+        // without the links that are fixed to it, which are bodies in this one
+        match tree.body.link_mass(&link.name).filter(|own| *own != LinkMass::none() || link.mass == LinkMass::none()) {
+            Some(own) => self.inertial(&link.name, &own),
+            None => {}
+        }
         self.content(tree, Some(k));
         for child in &tree.children[k] {
             self.link(tree, *child, &[]);
@@ -256,28 +260,69 @@ impl MjcfWriter<'_> {
 
     /// Writes the shapes of a link or of the base, and frames that are fixed to it.
     fn content(&mut self, tree: &Tree<'_>, link: Option<usize>) {
-        let (body, model) = (tree.body, tree.body.model());
-        let owner = link.map_or(tree.name, |k| &model.links()[k].name).to_owned();
-        let mut left: Vec<_> = visuals(body, link).collect();
-        let Some(parts) = body.collidable() else { return };
-        for part in body.colliders_of(link) {
-            let Some(shape) = parts.shape(part) else { continue };
-            let pose = body.part_pose(part);
-            let visual = visual_of(&mut left, shape, &pose);
-            let common = self.surface(&owner, parts, part, tree.collidable, visual.map(|visual| &visual.appearance));
-            let pose = pose * about_frame(shape);
-            self.solid(&owner, (parts, part), &pose, (tree.collidable, None), &common);
+        let model = tree.body.model();
+        if let Some(number) = link.and_then(|k| model.frame_index(&model.links()[k].name)) {
+            self.shapes_of_frame(tree, number, &Pose::identity());
+            let label = self.names.get(&(tree.id, link)).cloned().unwrap_or_default();
+            self.link_bodies.insert((tree.id, number), label);
         }
-        left.into_iter().for_each(|visual| self.visual_geom(&owner, visual));
-        for frame in model.frames().iter().filter(|f| f.link == link) {
+        for (number, frame) in model.frames().iter().enumerate().filter(|(_, frame)| frame.link == link) {
             if link.is_some_and(|k| model.links()[k].name == frame.name) {
                 continue;
             }
-            let mut t = Attributes::of("name", self.sites.unique(frame.name.clone()));
-            t.put_pose(&frame.pose);
-            self.xml.leaf("site", &t);
+            self.fixed_link(tree, number);
         }
         self.joint_sites_of((tree.id, link));
+    }
+
+    /// Writes a link that is fixed to another one or to the base: a body without a joint, or a site if it has neither mass nor shapes.
+    fn fixed_link(&mut self, tree: &Tree<'_>, number: usize) {
+        let frame = &tree.body.model().frames()[number];
+        let drawn = tree.body.visuals_of_links().any(|(own, visual)| own == number && visual.drawn().is_some());
+        let collides = tree.body.parts_of_link(&frame.name).is_ok_and(|parts| !parts.is_empty());
+        if frame.mass == LinkMass::none() && !drawn && !collides {
+            let mut t = Attributes::of("name", self.sites.unique(frame.name.clone()));
+            t.put_pose(&frame.pose);
+            return self.xml.leaf("site", &t);
+        }
+        let label = self.bodies.unique(frame.name.clone());
+        let mut t = Attributes::of("name", &label);
+        t.put_pose(&frame.pose);
+        self.xml.open("body", &t);
+        self.link_bodies.insert((tree.id, number), label);
+        if frame.mass != LinkMass::none() {
+            self.inertial(&frame.name, &frame.mass);
+        }
+        self.shapes_of_frame(tree, number, &frame.pose);
+        self.xml.close();
+    }
+
+    /// Writes the shapes and visuals of a link alone, whose frame has a pose in that of the body that carries it.
+    fn shapes_of_frame(&mut self, tree: &Tree<'_>, number: usize, at: &Pose) {
+        let (body, frame) = (tree.body, &tree.body.model().frames()[number]);
+        let back = at.inverse();
+        let own = body.visuals_of_links().filter(|(link, visual)| *link == number && visual.drawn().is_some());
+        let mut left: Vec<_> = own.map(|(_, visual)| visual).collect();
+        let Some(parts) = body.collidable() else { return };
+        for part in body.parts_of_link(&frame.name).unwrap_or_default() {
+            let Some(shape) = parts.shape(part) else { continue };
+            let pose = body.part_pose(part);
+            let visual = visual_of(&mut left, shape, &pose);
+            let common =
+                self.surface(&frame.name, parts, part, tree.collidable, visual.map(|visual| &visual.appearance));
+            let pose = back * pose * about_frame(shape);
+            self.solid(&frame.name, (parts, part), &pose, (tree.collidable, None), &common);
+        }
+        for visual in left {
+            self.visual_geom(&frame.name, &tumble_core::Visual { pose: back * visual.pose, ..visual.clone() });
+        }
+    }
+
+    /// Returns the names of the bodies of a carrier and of the links fixed to it that collide.
+    fn colliding_bodies(&self, tree: &Tree<'_>, carrier: Option<usize>) -> Vec<String> {
+        let frames: BTreeSet<usize> =
+            tree.body.colliders_of(carrier).filter_map(|part| tree.body.frame_of(part)).collect();
+        frames.into_iter().filter_map(|frame| self.link_bodies.get(&(tree.id, frame)).cloned()).collect()
     }
 
     /// Excludes pairs of links that collide in MuJoCo and not here.
@@ -296,8 +341,10 @@ impl MjcfWriter<'_> {
                 let (meets, neighbors) = (parts.parts_collide(first, second), joined(*a, *b) || joined(*b, *a));
                 let names = [a, b].map(|side| self.names.get(&(tree.id, *side)).cloned().unwrap_or_default());
                 if !meets && !neighbors && names[0] != names[1] {
-                    let [first, second] = names;
-                    self.contacts.push(("exclude", Attributes::of("body1", first).with("body2", second)));
+                    let [first, second] = [a, b].map(|side| self.colliding_bodies(tree, *side));
+                    for (first, second) in first.iter().flat_map(|a| second.iter().map(move |b| (a, b))) {
+                        self.contacts.push(("exclude", Attributes::of("body1", first).with("body2", second)));
+                    }
                 } else if meets && neighbors {
                     self.note(&names[0], "links of one joint that collide: MuJoCo leaves out such contacts");
                 }
