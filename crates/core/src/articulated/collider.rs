@@ -25,7 +25,7 @@ pub struct Collider {
     pub name: Option<String>,
     /// Surface constants of those parts of a compound that have their own.
     pub shape_materials: ShapeMaterials,
-    /// What those parts of a compound collide with that have filters of their own.
+    /// Filters of those parts of a compound that have their own.
     pub shape_filters: ShapeFilters,
     /// Direction, of any length above 0, in the frame of the shape, of a collider that collides on one side only, as a
     /// [one-sided body](crate::RigidBody::with_one_way) does; `None` for all others.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use tumble_collide::{CompoundShape, Shape};
 
-/// What one shape of a compound collides with, instead of what its body does.
+/// Group, mask and sensor of one shape of a compound, instead of those of its body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShapeFilter {
     /// Its collision group.

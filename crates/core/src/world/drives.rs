@@ -81,9 +81,10 @@ impl World {
         let wrong = |what: String| SnapshotError::Format(what);
         let stored = match bytes.is_empty() {
             true => Stored { magic: MAGIC, objects: Vec::new() },
-            false => postcard::from_bytes::<Stored>(bytes)
+            false => postcard::take_from_bytes::<Stored>(bytes)
                 .ok()
-                .filter(|stored| stored.magic == MAGIC)
+                .filter(|(stored, rest)| stored.magic == MAGIC && rest.is_empty())
+                .map(|(stored, _)| stored)
                 .ok_or_else(|| wrong(format!("{} bytes follow its end, which are no drives", bytes.len())))?,
         };
         let mut wanted: BTreeMap<ObjectId, Arc<[Drive]>> = self.first_drives.0.clone();

@@ -47,7 +47,7 @@ fn a_loop_joint_counts_the_turns_on_its_open_side() {
     }
 }
 
-/// Where 0 is beyond the limit, the joint starts in the turn that the limit allows and is nearest to it.
+/// A joint with a limit far from 0 starts in the turn that the limit allows and is nearest to 0.
 #[test]
 fn a_limit_far_from_zero_starts_in_its_turn() {
     let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));

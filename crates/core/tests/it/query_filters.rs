@@ -42,7 +42,7 @@ fn links_are_ignored_one_by_one() {
         let parts = links.iter().flat_map(|link| body.parts_of_link(link).unwrap());
         QueryFilter::default().ignoring_parts(robot, parts)
     };
-    // a fixed link and its carrier are told apart
+    // a fixed link is another one than its carrier
     assert_eq!(seen(&world, &without(&["arm"])), ["base", "tip", "hand", "red", "blue"]);
     assert_eq!(seen(&world, &without(&["tip", "base"])), ["arm", "hand", "red", "blue"]);
     assert_eq!(seen(&world, &without(&["hand"]).ignoring(red)), ["base", "arm", "tip", "blue"]);

@@ -80,6 +80,9 @@ fn a_snapshot_restores_the_drives() {
     let mut longer = untouched.0.clone();
     longer.extend([1, 2, 3]);
     assert!(world.restore(&longer).unwrap_err().to_string().contains("3 bytes follow its end"));
+    let mut more = changed.0.clone();
+    more.push(0);
+    assert!(world.restore(&more).is_err());
     let mut cut = changed.0.clone();
     cut.truncate(cut.len() - 4);
     assert!(world.restore(&cut).is_err());

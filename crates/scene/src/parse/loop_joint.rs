@@ -4,10 +4,11 @@ use tumble_core::articulated::{DofSettings, Spring};
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{Joint, LoopJointKind};
 
+use crate::parse::ball_joint::check_twist;
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
-use crate::parse::joint::{JointSpec, check_twist, number, read_limits};
+use crate::parse::joint::{JointSpec, number, read_limits};
 use crate::parse::rotation;
 use std::f64::consts::TAU;
 

@@ -94,7 +94,7 @@ pub struct CompoundPartSpec {
     pub density_kg_per_m3: Option<f64>,
     /// Surface constants of its own. Default: those of the body.
     pub surface: Option<PartSurface>,
-    /// What it collides with, and whether it is a sensor. Default: as its body.
+    /// Its group, mask and sensor. Default: those of its body.
     pub filter: PartFilter,
     /// Name, unlike those of all other shapes of the body or link; none for a compound.
     pub name: Option<String>,
@@ -119,7 +119,7 @@ pub struct PartSurface {
     pub contact: Material,
 }
 
-/// What a part of a compound collides with, as far as it is not that of its body or link.
+/// Group, mask and sensor of a part of a compound, as far as they are not those of its body or link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PartFilter {
     /// Its collision group.

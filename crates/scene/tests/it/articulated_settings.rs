@@ -1,4 +1,4 @@
-//! What scenes say about joints of links, shapes of compounds, drives in events and pairs of links is what the world has, and is saved.
+//! Joints of links, shapes of compounds, drives in events and pairs of links in scenes: the world has what the text says, and saves it.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -186,7 +186,7 @@ fn limits_may_be_on_one_side() {
     assert_errors(
         &text("revolute", "limits_rad = [-4, 4]"),
         &[
-            "s.toml:12:14: `limits_rad` of \"axle\" is [-4, 4]; expected limits at most 2π (360°) apart, or -inf or inf on one \
+            "s.toml:12:14: `limits_rad` of loop_joint \"axle\" is [-4, 4]; expected limits at most 2π (360°) apart, or -inf or inf on one \
            side: a revolute joint counts turns only there",
         ],
     );
@@ -239,7 +239,9 @@ fn a_pair_of_a_fixed_link_holds_for_its_own_shapes() {
 /// A fixed link is a body without a joint, with its name, its mass and its shapes; what it was together with its carrier is the same.
 #[test]
 fn mjcf_has_fixed_links_as_bodies() {
-    let world = build(&format!("{TOOL}[[pair]]\na = \"robot/tool\"\nb = \"ball\"\ncollides = false\n"));
+    let world = build(&format!(
+        "[world]\ncombine_friction = \"max\"\n{TOOL}[[pair]]\na = \"robot/tool\"\nb = \"ball\"\ncollides = false\n"
+    ));
     let written = MjcfWriter::new(&world).text("files");
     assert_eq!(written.notes, Vec::<String>::new());
     assert!(written.text.contains("<body name=\"tool\" pos=\"1 0 0\">"), "{}", written.text);

@@ -15,6 +15,7 @@
 //! Everything else is a note.
 
 mod bodies;
+mod fixed_links;
 mod geoms;
 mod joints;
 mod links;
