@@ -156,7 +156,7 @@ def test_an_event_drives_the_degree_of_freedom_that_it_names(tmp_path):
     read = tumble.World.load(tmp_path / "event.toml")
     for each in (world, read):
         each.step(960)
-        assert [dof.position for dof in each["cardan"].dofs] == pytest.approx([0, 0.5], abs=1e-4)
+        assert [dof.position for dof in each.joint("cardan").dofs] == pytest.approx([0, 0.5], abs=1e-4)
         assert np.allclose(rotation_vector(each.articulation("lamp").q), (-0.2, 0, 0.3), atol=1e-4)
     with pytest.raises(ValueError, match="no degree of freedom 3"):
         world.add_event("no", tumble.Trigger.time(1), [action("lamp/head", 1, dof=3)])

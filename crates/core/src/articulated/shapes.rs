@@ -99,7 +99,8 @@ impl ArticulatedBody {
                 });
             }
         }
-        for (_, material) in collider.shape_materials.as_slice() {
+        let own = collider.shape_materials.as_slice().iter().map(|(_, own)| own);
+        for material in std::iter::once(&collider.material).chain(own) {
             material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
         }
         match collider.one_way.map(|direction: Vec3| direction.norm()) {

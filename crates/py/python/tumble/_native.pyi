@@ -17,6 +17,7 @@ from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
+_BodyOrLink: TypeAlias = RigidBody | Articulation | str | tuple[Articulation | str, str]
 _Object: TypeAlias = (
     RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
 )
@@ -450,6 +451,12 @@ class RigidBody:
 
         shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
         """
+    def shape_filter(self, shape: int | str) -> dict[str, Any]:
+        """Filter."""
+    def set_shape_filter(
+        self, shape: int | str, *, group: int | None = None, mask: int | Sequence[int] | None = None, sensor: bool | None = None
+    ) -> None:
+        """Filter."""
     def set_shape_material(
         self,
         shape: int | str,
@@ -911,7 +918,7 @@ class Action:
         orientations: shape (n, 4), by default none. smoothness: ``"c1"`` or ``"c2"``; ends: ``"rest"``, ``"free"`` or ``"loop"``.
         """
     @staticmethod
-    def drive(joint: _Object, target: float) -> Action:
+    def drive(joint: _Object, target: float, *, dof: int = 0) -> Action:
         """Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
         ``"ARTICULATION/LINK"`` for the joint that moves the link.
         """
@@ -1356,12 +1363,12 @@ class ArticulationBuilder:
         joint_friction: float = 0.0,
         armature: float = 0.0,
         stiffness: float = 0.0,
-        rest: float = 0.0,
-        drive: Mapping[str, float] | None = None,
+        rest: ArrayLike = 0.0,
+        drive: Mapping[str, Any] | None = None,
         max_velocity: float | None = None,
         effort: float | None = None,
-        q: float | None = None,
-        qd: float | None = None,
+        q: ArrayLike | None = None,
+        qd: ArrayLike | None = None,
         friction: float = 0.5,
         restitution: float = 0.0,
         collidable: bool = True,
@@ -1370,6 +1377,15 @@ class ArticulationBuilder:
         contacts: Contacts = "surface",
         group: int = 0,
         mask: int | Sequence[int] | None = None,
+        twist_limits: ArrayLike | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1412,6 +1428,14 @@ class ArticulationBuilder:
         mask: int | Sequence[int] | None = None,
         color: ArrayLike | None = None,
         visible: bool = True,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
@@ -1709,6 +1733,11 @@ class Articulation:
     @stiffness.setter
     def stiffness(self, value: ArrayLike) -> None: ...
     @property
+    def twist_limits(self) -> _Floats:
+        """Limits."""
+    @twist_limits.setter
+    def twist_limits(self, value: ArrayLike) -> None: ...
+    @property
     def rest(self) -> _Floats:
         """Rest position of the spring of each degree of freedom, shape (dof,), rad or m. Settable like ``joint_damping``."""
     @rest.setter
@@ -1783,8 +1812,8 @@ class Articulation:
         self,
         joint: str,
         *,
-        target: float | None = None,
-        velocity: float | None = None,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         max_force: float | None = None,
@@ -2680,7 +2709,8 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> NDArray[np.void]:
         """Returns where rays enter bodies: a structured array with one row per ray.
 
@@ -2708,7 +2738,8 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
         """Returns the first body that a shape touches if it moves along a direction without rotation, or
         None.
@@ -2726,7 +2757,8 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> NDArray[np.void]:
         """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``,
         ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
@@ -2742,7 +2774,8 @@ class World:
         orientation: ArrayLike | None = None,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
         """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
         if ``b`` is None. None if a body has no shape or is disabled.
@@ -2753,14 +2786,14 @@ class World:
         the first. group, mask, ignore: of a shape, as in ``cast_rays``.
         """
     def contains(
-        self, point: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, point: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None, as_body: _BodyOrLink | None = None
     ) -> NDArray[np.int64]:
         """Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
 
         point: shape (3,), m. The surface belongs to a body. group, mask, ignore: as in ``cast_rays``.
         """
     def point_depth(
-        self, points: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, points: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None, as_body: _BodyOrLink | None = None
     ) -> Any:
         """Returns how deep points lie in the bodies: one row for a point of shape (3,), a structured
         array for points of shape (n, 3), m.

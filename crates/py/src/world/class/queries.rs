@@ -84,8 +84,9 @@ impl World {
     ///
     /// A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
     /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies (a handle, a name or a
-    /// list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
+    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+    /// name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
+    /// with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
     #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn cast_rays<'py>(
