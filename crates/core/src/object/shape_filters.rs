@@ -203,7 +203,8 @@ impl<'a> FilteredPart<'a> {
         };
         let theirs = other.classes().map_or_else(|| vec![other.whole()], |(_, classes)| classes);
         // shapes of the other part that meet the same shapes of this one are one pair
-        let mut found: Vec<(Vec<Option<ShapeFilter>>, Cow<'a, Shape>, Vec<Option<ShapeFilter>>)> = Vec::new();
+        type Filters = Vec<Option<ShapeFilter>>;
+        let mut found: Vec<(Filters, Cow<'a, Shape>, Filters)> = Vec::new();
         for class in theirs.iter().filter(|class| !class.is_sensor(other.body, other.part)) {
             let own = self.classes().map_or_else(|| vec![self.whole()], |(_, classes)| classes);
             let met: Vec<_> = own.iter().filter(|own| meets(own, class)).map(|own| own.filter).collect();
@@ -214,7 +215,7 @@ impl<'a> FilteredPart<'a> {
                 }
             }
         }
-        let pair = |(_, shape, filters): (_, Cow<'a, Shape>, Vec<Option<ShapeFilter>>)| {
+        let pair = |(_, shape, filters): (_, Cow<'a, Shape>, Filters)| {
             Some([shape, other.shape_if(|class| filters.contains(&class.filter))?])
         };
         found.into_iter().filter_map(pair).collect()

@@ -98,6 +98,7 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
         parts: MovingPair {
             mode: ContactMode::Surface,
             tests: OwnTests::NONE,
+            filtered: None,
             shapes: [&cylinder, &block],
             part_states: [&part_states[0], &part_states[1]],
             skipped: &[],

@@ -132,9 +132,9 @@ impl MjcfWriter<'_> {
             self.joint(tree, *joint, &below.inverse());
         }
         // without the links that are fixed to it, which are bodies in this one
-        match tree.body.link_mass(&link.name).filter(|own| *own != LinkMass::none() || link.mass == LinkMass::none()) {
-            Some(own) => self.inertial(&link.name, &own),
-            None => {}
+        let own = tree.body.link_mass(&link.name).unwrap_or(link.mass);
+        if own != LinkMass::none() || link.mass == LinkMass::none() {
+            self.inertial(&link.name, &own);
         }
         self.content(tree, Some(k));
         for child in &tree.children[k] {
