@@ -27,7 +27,7 @@ def test_drives_that_the_program_set_are_saved_and_restored():
     axle.set_drive(velocity=3, max_force=4)
     world.step(10)
     saved = world.save()
-    assert len(saved) > len(plain) and saved.endswith(b"tumbleD1") and not plain.endswith(b"tumbleD1")
+    assert len(saved) > len(plain) and b"tumbleD2" in saved and b"tumbleD2" not in plain
     world.step(100)
     expected = world.state.copy()
     # another program has set other drives meanwhile
@@ -61,9 +61,10 @@ def test_damaged_drives_change_nothing():
     damaged = [
         saved[: place] + np.float64(-3).tobytes() + saved[place + 8 :],
         saved[: place] + np.float64(np.nan).tobytes() + saved[place + 8 :],
-        saved[:-13] + saved[-12:],
-        saved[:-12] + np.uint32(3).tobytes() + saved[-8:],
-        saved[:-12] + np.uint32(2**31).tobytes() + saved[-8:],
+        saved[:-1],
+        saved + b"x",
+        saved.replace(b"tumbleD2", b"tumbleD3"),
+        saved + b"tumbleD1",
     ]
     for bad in damaged:
         with pytest.raises(tumble.SnapshotError):

@@ -101,7 +101,7 @@ pub use parse::mount::Mounts;
 pub use parse::pair::{PairSideSpec, PairSpec};
 pub use parse::problem::{Invalid, Problem};
 pub use parse::sensor::{SensorPlaceSpec, SensorSpec};
-pub use parse::shape::{CompoundPartSpec, PartSurface, ShapeSpec};
+pub use parse::shape::{CompoundPartSpec, PartFilter, PartSurface, ShapeSpec};
 pub use parse::terrain::{Heights, HullPoints};
 pub use parse::view::{CameraSpec, CavePlace, GroundSpec, LightKind, LightSpec, SkySpec};
 pub use parse::world::{Integrator, Solver, Stepper, UnknownName, WorldSettings, combine_by_name};

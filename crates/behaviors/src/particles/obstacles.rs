@@ -4,7 +4,7 @@
 use super::cells::Cells;
 use super::first_contact::Rates;
 use tumble_collide::{Aabb, BoxTree, Pose, Shape, Vec3};
-use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState};
+use tumble_core::{CollisionGroup, Frame, Material, ObjectId, PartState, shape_meeting};
 
 /// Number of obstacles from which a tree finds those near a path.
 const MANY: usize = 48;
@@ -74,10 +74,11 @@ impl<'a> Obstacles<'a> {
             let Some(body) = object.collidable() else { continue };
             for (part, row) in range.parts.clone().enumerate() {
                 let Some(shape) = body.shape(part) else { continue };
-                let meets = mask & body.collision_group(part).bit() != 0 && body.collides_with(part, group);
-                if body.is_sensor(part) || !meets {
-                    continue;
-                }
+                let Some(met) = shape_meeting(body, part, group, mask) else { continue };
+                let meets = |number: usize| match &*met {
+                    Shape::Compound(compound) => compound.is_active(number),
+                    _ => true,
+                };
                 let (before, state) = (frame.before[row].pose, &view.part_states[row]);
                 let moves = before != state.pose;
                 let turn = (state.pose.rotation * before.rotation.inverse()).scaled_axis();
@@ -91,7 +92,7 @@ impl<'a> Obstacles<'a> {
                     angular: turn / frame.dt,
                 });
                 let (material, dynamic) = (body.material(part), dynamic && body.part_moves(part));
-                for (number, (shape, placed)) in pieces(shape).into_iter().enumerate() {
+                for (number, (shape, placed)) in pieces(shape).into_iter().enumerate().filter(|(n, _)| meets(*n)) {
                     let own = body.shape_materials(part).iter().find(|(shape, _)| *shape == number);
                     let material = own.map_or(material, |(_, material)| *material);
                     let at = |pose: &Pose| shape.tight_aabb(&placed.map_or(*pose, |placed| pose * placed));

@@ -87,7 +87,7 @@ impl Shape {
 /// Returns the closest point of the surface of a compound, and the index of its part.
 fn closest_of_compound(compound: &CompoundShape, p: &Vec3) -> ((Vec3, f64, Vec3), u32) {
     let mut least = ((*p, f64::INFINITY, Vec3::z()), 0);
-    for (n, (part, own)) in (0..).zip(compound.placed()) {
+    for (n, part, own) in compound.active_parts().map(|(n, part, own)| (n as u32, part, own)) {
         let found = part.closest_point(own, p);
         if found.distance < least.0.1 {
             least = ((found.point, found.distance, found.normal), n);

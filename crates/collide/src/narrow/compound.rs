@@ -41,7 +41,7 @@ pub(super) fn contacts_of_compound(
     let start = out.len();
     // the deepest contact inside another part, used only if nothing else overlaps
     let mut fallback: Option<Contact> = None;
-    for (n, (shape, own)) in compound.placed().enumerate() {
+    for (n, shape, own) in compound.active_parts() {
         let bounds = &compound.boxes()[n];
         if !(0..3).all(|k| bounds.min[k] <= near.max[k] && near.min[k] <= bounds.max[k]) {
             continue;

@@ -87,7 +87,9 @@ fn contacts_in_order(
 /// collides by its spheres.
 pub fn closest_point_within(shape: &Shape, pose: &Pose, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
     if let Shape::Compound(compound) = shape {
-        let parts = compound.placed().filter_map(|(part, own)| closest_point_within(part, &(pose * own), point, limit));
+        let parts = compound
+            .active_parts()
+            .filter_map(|(_, part, own)| closest_point_within(part, &(pose * own), point, limit));
         return parts.min_by(|x, y| x.distance.total_cmp(&y.distance));
     }
     if shape.is_rounded() {

@@ -144,7 +144,7 @@ fn compound_entry(compound: &CompoundShape, o: &Vec3, d: &Vec3, max: f64) -> Opt
     }
     let step = STEP * compound.bounding_radius();
     let mut best: Option<(LocalHit, u32)> = None;
-    for (n, (part, own)) in compound.placed().enumerate() {
+    for (n, part, own) in compound.active_parts() {
         let mut start = 0.0;
         for _ in 0..MAX_ENTRIES {
             let limit = best.map_or(max, |((distance, ..), _)| distance) - start;

@@ -14,7 +14,7 @@ use crate::{Aabb, CylinderShape, MassProperties, Mat3, MeshShape, Pose, ShapeErr
 use nalgebra::Translation3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Maximum number of parts: each is compared with all others once.
 const MAX_PARTS: usize = 4096;
@@ -79,7 +79,13 @@ pub struct CompoundShape {
     boxes: OnceLock<Vec<Aabb>>,
     /// Parts whose boxes overlap that of each part.
     neighbors: OnceLock<Vec<Vec<u32>>>,
+    /// Whether each part is there, for a compound that is a subset of another.
+    active: Option<Vec<bool>>,
+    /// The subsets made so far, by the indices of their parts.
+    subsets: Arc<Mutex<Subsets>>,
 }
+
+type Subsets = BTreeMap<Vec<u32>, Arc<CompoundShape>>;
 
 impl CompoundShape {
     /// Returns a compound; parts that are compounds are replaced by their own parts.
@@ -148,7 +154,35 @@ impl CompoundShape {
             bounding_radius,
             boxes: OnceLock::new(),
             neighbors: OnceLock::new(),
+            active: None,
+            subsets: Arc::default(),
         })
+    }
+
+    /// Returns the compound with only some of its parts, ascending and of indices below their number, for contacts and queries:
+    /// parts keep their indices, and frame, mass and bounding radius stay those of the whole. Made once for each subset.
+    pub fn subset(&self, parts: &[u32]) -> Arc<CompoundShape> {
+        let mut made = self.subsets.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some(known) = made.get(parts) {
+            return known.clone();
+        }
+        let mut active = vec![false; self.parts.len()];
+        for part in parts {
+            active.get_mut(*part as usize).into_iter().for_each(|active| *active = self.is_active(*part as usize));
+        }
+        let subset = Arc::new(CompoundShape { active: Some(active), subsets: Arc::default(), ..self.clone() });
+        made.insert(parts.to_vec(), subset.clone());
+        subset
+    }
+
+    /// Returns whether a part is there: all are, except in a [`subset`](Self::subset).
+    pub fn is_active(&self, part: usize) -> bool {
+        self.active.as_ref().is_none_or(|active| active.get(part).copied().unwrap_or(false))
+    }
+
+    /// Returns the index, the shape and the pose about the center of mass of each part that is there.
+    pub fn active_parts(&self) -> impl Iterator<Item = (usize, &Shape, &Pose)> {
+        self.placed().enumerate().filter(|(n, _)| self.is_active(*n)).map(|(n, (shape, pose))| (n, shape, pose))
     }
 
     /// Returns the parts, in the frame in which they were given.
@@ -197,14 +231,14 @@ impl CompoundShape {
     /// Returns the box in world axes around the boxes of the parts.
     pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
         if self.parts.len() <= FEW_PARTS {
-            return joined(self.placed().map(|(shape, own)| shape.aabb(&(pose * own))));
+            return joined(self.active_parts().map(|(_, shape, own)| shape.aabb(&(pose * own))));
         }
-        turned(&joined(self.boxes().iter().copied()), pose)
+        turned(&joined((0..).zip(self.boxes()).filter(|(n, _)| self.is_active(*n)).map(|(_, own)| *own)), pose)
     }
 
     /// Returns the box in world axes around the surfaces of the parts.
     pub(crate) fn tight_aabb(&self, pose: &Pose) -> Aabb {
-        joined(self.placed().map(|(shape, own)| shape.tight_aabb(&(pose * own))))
+        joined(self.active_parts().map(|(_, shape, own)| shape.tight_aabb(&(pose * own))))
     }
 
     /// Returns whether a point, in the compound's frame, on part `part` lies inside another part.
@@ -212,7 +246,7 @@ impl CompoundShape {
         let depth = BURIED * self.bounding_radius;
         let inside = |other: u32| {
             let other = other as usize;
-            self.parts[other].shape.closest_point(&self.poses[other], point).distance < -depth
+            self.is_active(other) && self.parts[other].shape.closest_point(&self.poses[other], point).distance < -depth
         };
         self.neighbors()[part].iter().any(|other| inside(*other))
     }

@@ -6,7 +6,7 @@ use super::{ArchiveError, damaged};
 use crate::articulated::{ArticulatedParts, Collider};
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
-use crate::object::{Material, ShapeMaterials};
+use crate::object::{Material, ShapeFilter, ShapeFilters, ShapeMaterials};
 use crate::object::{Object, Renderable};
 use crate::{ArticulatedBody, Coupling, DofSettings, LockedAxes, Model, RigidBody};
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,7 @@ pub(super) struct RigidRecord {
     mass: Option<(f64, Mat3)>,
     material: Material,
     shape_materials: Vec<(usize, Material)>,
+    shape_filters: Vec<(usize, ShapeFilter)>,
     shape_name: Option<String>,
     linear_damping: f64,
     angular_damping: f64,
@@ -48,6 +49,7 @@ impl RigidRecord {
             mass: (!body.is_fixed()).then(|| (body.mass(), *body.inertia())),
             material: body.material,
             shape_materials: body.shape_materials().to_vec(),
+            shape_filters: body.shape_filters().to_vec(),
             shape_name: body.shape_name.clone(),
             linear_damping: body.linear_damping,
             angular_damping: body.angular_damping,
@@ -76,6 +78,9 @@ impl RigidRecord {
         let mut body = body.with_center_in_part(self.center);
         for (shape, material) in self.shape_materials {
             body.set_shape_material(shape, Some(material));
+        }
+        for (shape, filter) in self.shape_filters {
+            body.set_shape_filter(shape, Some(filter));
         }
         body.shape_name = self.shape_name;
         (body.material, body.contact_mode) = (self.material, self.contact_mode);
@@ -108,14 +113,26 @@ struct ColliderRecord {
     mask: u64,
     name: Option<String>,
     shape_materials: ShapeMaterials,
+    shape_filters: ShapeFilters,
     one_way: Option<Vec3>,
     sensor: bool,
 }
 
 impl ColliderRecord {
     fn of(link: usize, collider: &Collider, tables: &mut Tables) -> ColliderRecord {
-        let Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way, sensor } =
-            collider;
+        let Collider {
+            pose,
+            shape,
+            material,
+            contact_mode,
+            group,
+            mask,
+            name,
+            shape_materials,
+            shape_filters,
+            one_way,
+            sensor,
+        } = collider;
         ColliderRecord {
             link,
             pose: *pose,
@@ -126,6 +143,7 @@ impl ColliderRecord {
             mask: *mask,
             name: name.clone(),
             shape_materials: shape_materials.clone(),
+            shape_filters: shape_filters.clone(),
             one_way: *one_way,
             sensor: *sensor,
         }
@@ -142,13 +160,26 @@ impl ColliderRecord {
             mask,
             name,
             shape_materials,
+            shape_filters,
             one_way,
             sensor,
         } = self;
         let shape = shape(&tables.shapes, index)?;
         Ok((
             link,
-            Collider { pose, shape, material, contact_mode, group, mask, name, shape_materials, one_way, sensor },
+            Collider {
+                pose,
+                shape,
+                material,
+                contact_mode,
+                group,
+                mask,
+                name,
+                shape_materials,
+                shape_filters,
+                one_way,
+                sensor,
+            },
         ))
     }
 }

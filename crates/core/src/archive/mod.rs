@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleAJ`; the last is the number of the format | 8 |
+//! | `tumbleAK`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -19,6 +19,7 @@ mod records;
 mod script;
 mod sensors;
 
+use crate::articulated::Drive;
 use crate::report::StepReport;
 use crate::settings::Settings;
 use crate::solver::{self, RowSolver};
@@ -46,7 +47,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleAJ";
+const HEAD: &[u8; 8] = b"tumbleAK";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -109,6 +110,8 @@ struct Archive {
     contacts: Vec<ContactRecord>,
     events: Vec<EventRecord>,
     report: ReportRecord,
+    /// The drives with which objects were added, of those that the program has changed.
+    first_drives: Vec<(u32, Vec<Drive>)>,
 }
 
 /// One object and its name in the world.
@@ -178,6 +181,7 @@ impl World {
             contacts: self.contacts().iter().map(|c| ContactRecord::of(c, &indices)).collect(),
             events: self.events().iter().map(|event| EventRecord::of(event, &indices)).collect(),
             report: ReportRecord::of(self.report(), &indices),
+            first_drives: self.first_drives(),
         };
         seal(HEAD, &archive)
     }
@@ -229,6 +233,12 @@ impl World {
             match event.clone().prepare(&world) {
                 Ok(()) | Err(EventError::Gone(_)) => {} // it may name a removed object
                 Err(why) => return Err(damaged(why)),
+            }
+        }
+        for (place, drives) in archive.first_drives {
+            let id = ids.get(place as usize).copied().unwrap_or_default();
+            if !world.set_first_drives(id, drives) {
+                return Err(damaged(format!("object {place} has another number of drives")));
             }
         }
         let contacts = archive.contacts.into_iter().map(|c| c.contact(&ids)).collect();

@@ -473,6 +473,17 @@ impl ArticulatedBody {
         self.colliders.iter().enumerate().filter(move |(_, part)| part.link == link).map(move |(k, _)| first + k)
     }
 
+    /// Returns the parts that are the shapes of a link alone, which may be a fixed one: without those of links that are fixed to it.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
+    pub fn parts_of_link(&self, link: &str) -> Result<Vec<usize>, ArticulatedError> {
+        let number = self.model.frame_index(link).ok_or_else(|| self.no_link(link))?;
+        let first = self.model.links().len() + 1;
+        let own = self.colliders.iter().zip(first..).filter(|(part, _)| part.frame == number);
+        Ok(own.map(|(_, part)| part).collect())
+    }
+
     /// Returns the collider of a part, if it has one.
     pub(super) fn collider(&self, part: usize) -> Option<&LinkCollider> {
         self.colliders.get(part.checked_sub(self.model.links().len() + 1)?)

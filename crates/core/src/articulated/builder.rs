@@ -132,9 +132,11 @@ impl ArticulationBuilder {
                 body.model().link(&link.name).map(|k| (body.model().links()[k].q, body.model().links()[k].v))
             else {
                 match link.dof == DofSettings::default()
+                    && link.dofs.is_empty()
                     && link.cone.is_none()
-                    && link.position.is_none()
-                    && link.velocity.is_none()
+                    && link.twist_limits.is_none()
+                    && link.positions.as_ref().is_none_or(Vec::is_empty)
+                    && link.velocities.as_ref().is_none_or(Vec::is_empty)
                 {
                     true => continue,
                     false => return Err(self.wrong_joint(link, "it has settings of a joint")),
@@ -144,22 +146,44 @@ impl ArticulationBuilder {
             if link.cone.is_some() && !spherical {
                 return Err(self.wrong_joint(link, "it has a cone, which only spherical joints have"));
             }
+            if link.twist_limits.is_some() && !spherical {
+                return Err(self.wrong_joint(link, "it has limits of a twist, which only spherical joints have"));
+            }
             if spherical && link.dof.limits.is_some() {
                 return Err(self.wrong_joint(link, "it has limits of one angle; a spherical joint has a cone"));
             }
             if link.cone.is_some_and(|(axis, _)| axis > 2) {
                 return Err(self.wrong_joint(link, "the axis of its cone is not 0, 1 or 2"));
             }
-            for (k, index) in (v..v + link.joint.dof()).enumerate() {
-                let cone = link.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
-                body.set_dof(index, DofSettings { limits: link.dof.limits.or(cone), ..link.dof.clone() })?;
+            if link.twist_limits.is_some_and(|(axis, _)| axis > 2) {
+                return Err(self.wrong_joint(link, "the axis of its twist is not 0, 1 or 2"));
             }
-            for (value, index) in [(link.position, q), (link.velocity, velocities + v)] {
-                let Some(value) = value else { continue };
-                if link.joint.dof() != 1 {
-                    return Err(self.wrong_joint(link, "it has a position or a velocity, which needs one"));
+            if link.dofs.iter().any(|(k, _)| *k >= link.joint.dof()) {
+                return Err(self.wrong_joint(link, "it has settings of another degree of freedom"));
+            }
+            for (k, index) in (v..v + link.joint.dof()).enumerate() {
+                body.set_dof(index, link.settings_of(k))?;
+            }
+            let [positions, rates] = [link.joint.positions(), link.joint.dof()];
+            for (values, index, count, what) in [
+                (
+                    &link.positions,
+                    q,
+                    positions,
+                    "it has a position at time 0 with another count of numbers than its joint",
+                ),
+                (
+                    &link.velocities,
+                    velocities + v,
+                    rates,
+                    "it has a velocity at time 0 with another count of numbers than its joint",
+                ),
+            ] {
+                let Some(values) = values else { continue };
+                if values.len() != count {
+                    return Err(self.wrong_joint(link, what));
                 }
-                start[index] = value;
+                start[index..index + count].copy_from_slice(values);
             }
         }
         if !body.is_state(&start) {

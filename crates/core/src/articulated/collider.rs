@@ -1,7 +1,7 @@
 //! Shapes on links.
 
 use crate::object::collidable::CollisionGroup;
-use crate::object::{Material, ShapeMaterials};
+use crate::object::{Material, ShapeFilter, ShapeFilters, ShapeMaterials};
 use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 
 /// A shape on a link.
@@ -25,6 +25,8 @@ pub struct Collider {
     pub name: Option<String>,
     /// Surface constants of those parts of a compound that have their own.
     pub shape_materials: ShapeMaterials,
+    /// Filters of those parts of a compound that have their own.
+    pub shape_filters: ShapeFilters,
     /// Direction, of any length above 0, in the frame of the shape, of a collider that collides on one side only, as a
     /// [one-sided body](crate::RigidBody::with_one_way) does; `None` for all others.
     pub one_way: Option<Vec3>,
@@ -45,6 +47,7 @@ impl Collider {
             mask: u64::MAX,
             name: None,
             shape_materials: ShapeMaterials::default(),
+            shape_filters: ShapeFilters::default(),
             one_way: None,
             sensor: false,
         }
@@ -68,6 +71,13 @@ impl Collider {
     #[must_use]
     pub fn with_shape_material(mut self, shape: usize, material: Material) -> Self {
         self.shape_materials.set(shape, Some(material));
+        self
+    }
+
+    /// Sets what one part of its compound collides with, and whether it is a sensor.
+    #[must_use]
+    pub fn with_shape_filter(mut self, shape: usize, filter: ShapeFilter) -> Self {
+        self.shape_filters.set(shape, Some(filter));
         self
     }
 

@@ -9,7 +9,7 @@ use crate::RigidBody;
 use crate::object::collidable::CollisionGroup;
 use crate::object::{Appearance, Material};
 use nalgebra::Translation3;
-use tumble_collide::{ContactMode, Pose, Shape, Vec3};
+use tumble_collide::{ContactMode, Pose, Quat, Shape, Vec3};
 
 /// The mass of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,12 +63,15 @@ pub struct LinkBuilder {
     pub(super) dof: DofSettings,
     pub(super) armature: f64,
     pub(super) cone: Option<(usize, f64)>,
+    pub(super) twist_limits: Option<(usize, [f64; 2])>,
+    /// Settings of single degrees of freedom, instead of `dof`.
+    pub(super) dofs: Vec<(usize, DofSettings)>,
     pub(super) appearance: Appearance,
     pub(super) material: Material,
     pub(super) contact_mode: ContactMode,
     pub(super) groups: (CollisionGroup, u64),
-    pub(super) position: Option<f64>,
-    pub(super) velocity: Option<f64>,
+    pub(super) positions: Option<Vec<f64>>,
+    pub(super) velocities: Option<Vec<f64>>,
 }
 
 impl LinkBuilder {
@@ -84,12 +87,14 @@ impl LinkBuilder {
             dof: DofSettings::default(),
             armature: 0.0,
             cone: None,
+            twist_limits: None,
+            dofs: Vec::new(),
             appearance: Appearance::default(),
             material: Material::default(),
             contact_mode: ContactMode::default(),
             groups: (CollisionGroup::default(), u64::MAX),
-            position: None,
-            velocity: None,
+            positions: None,
+            velocities: None,
         }
     }
 
@@ -209,6 +214,13 @@ impl LinkBuilder {
         self
     }
 
+    /// Sets the limits of the twist of its spherical joint, rad: of the turn of the link about its axis 0, 1 or 2 (x, y or z), after
+    /// the shortest turn of that axis of the joint's frame to it. At most 3π/2 apart and within 2π of 0.
+    pub fn with_twist_limits(mut self, axis: usize, limits: [f64; 2]) -> Self {
+        self.twist_limits = Some((axis, limits));
+        self
+    }
+
     /// Sets the largest speed of its joint, rad/s or m/s; infinite for none.
     pub fn with_max_velocity(mut self, max_velocity: f64) -> Self {
         self.dof.max_velocity = max_velocity;
@@ -228,7 +240,8 @@ impl LinkBuilder {
         self
     }
 
-    /// Sets a spring of its joint: stiffness, N·m/rad or N/m, and rest position, rad or m.
+    /// Sets a spring of its joint: stiffness, N·m/rad or N/m, and rest position, rad or m; of a spherical joint each component of its
+    /// rotation vector.
     pub fn with_spring(mut self, stiffness: f64, rest: f64) -> Self {
         self.dof.spring = Some(Spring { stiffness, rest });
         self
@@ -246,16 +259,46 @@ impl LinkBuilder {
         self
     }
 
-    /// Sets the position of a revolute or prismatic joint at time 0, rad or m.
-    pub fn with_position(mut self, position: f64) -> Self {
-        self.position = Some(position);
+    /// Sets the settings of degree of freedom `k` of its joint instead of those of [`with_dof`](Self::with_dof): rest position and
+    /// target of a spherical joint are component `k` of a rotation vector.
+    pub fn with_dof_at(mut self, k: usize, dof: DofSettings) -> Self {
+        self.dofs.push((k, dof));
         self
     }
 
+    /// Returns the settings of degree of freedom `k` of its joint.
+    pub(super) fn settings_of(&self, k: usize) -> DofSettings {
+        let own = self.dofs.iter().rev().find(|(own, _)| *own == k).map_or(&self.dof, |(_, dof)| dof);
+        let cone = self.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
+        let twist = self.twist_limits.filter(|(axis, _)| *axis == k).map(|(_, limits)| limits);
+        DofSettings { limits: own.limits.or(cone), twist_limits: own.twist_limits.or(twist), ..own.clone() }
+    }
+
+    /// Sets the position of a revolute or prismatic joint at time 0, rad or m.
+    pub fn with_position(self, position: f64) -> Self {
+        self.with_positions(&[position])
+    }
+
     /// Sets the velocity of a revolute or prismatic joint at time 0, rad/s or m/s.
-    pub fn with_velocity(mut self, velocity: f64) -> Self {
-        self.velocity = Some(velocity);
+    pub fn with_velocity(self, velocity: f64) -> Self {
+        self.with_velocities(&[velocity])
+    }
+
+    /// Sets the position of a joint of any type at time 0: as many numbers as [`Joint`] lists.
+    pub fn with_positions(mut self, positions: &[f64]) -> Self {
+        self.positions = Some(positions.to_vec());
         self
+    }
+
+    /// Sets the velocity of a joint of any type at time 0: as many numbers as [`Joint`] lists.
+    pub fn with_velocities(mut self, velocities: &[f64]) -> Self {
+        self.velocities = Some(velocities.to_vec());
+        self
+    }
+
+    /// Sets the rotation of a spherical joint at time 0: of the link in the frame of the joint.
+    pub fn with_rotation(self, rotation: Quat) -> Self {
+        self.with_positions(rotation.coords.as_slice())
     }
 
     /// Sets the surface constants of its shapes.
@@ -281,6 +324,11 @@ impl LinkBuilder {
     pub fn with_appearance(mut self, appearance: Appearance) -> Self {
         self.appearance = appearance;
         self
+    }
+
+    /// Returns the settings of its joint: of all degrees of freedom without settings of their own.
+    pub fn dof(&self) -> &DofSettings {
+        &self.dof
     }
 
     /// Returns its name.

@@ -30,6 +30,7 @@ pub use builder_error::ArticulationError;
 pub use collider::Collider;
 pub use link_builder::LinkBuilder;
 pub use model::coordinates::{difference, integrate, normalize};
+pub(crate) use model::dof::twist_fault;
 pub use model::dof::{Coupling, DofSettings, Drive, Spring};
 pub use model::joint::Joint;
 pub use model::playback::{Playback, PlaybackError};

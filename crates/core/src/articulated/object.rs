@@ -10,13 +10,13 @@ use crate::articulated::algorithms::kinematics::Kinematics;
 use crate::articulated::model::coordinates::{difference, integrate};
 use crate::articulated::model::joint::Joint;
 use crate::derived::Cache;
-use crate::object::Material;
 use crate::object::collidable::{Collidable, CollisionGroup};
 use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount};
 use crate::object::net_sync;
 use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
 use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
+use crate::object::{Material, ShapeFilter};
 use crate::rigid::rotation;
 use crate::rigid::vec3;
 use crate::world::view::WorldView;
@@ -143,7 +143,7 @@ impl Integratable for ArticulatedBody {
             let pose = &view.part_states[me.parts.start + i].pose;
             wrench.torque += (pose.rotation * link.mass.center).cross(&weight);
         }
-        self.joint_forces(&view.x[me.x.clone()], view.implicit, &mut out.generalized[me.v.clone()]);
+        self.joint_forces(&view.x[me.x.clone()], view.implicit, view.time, &mut out.generalized[me.v.clone()]);
     }
 
     fn derivative(&self, cache: &mut Cache, _x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
@@ -298,6 +298,10 @@ impl Collidable for ArticulatedBody {
 
     fn shape_materials(&self, part: usize) -> &[(usize, Material)] {
         self.collider(part).map_or(&[], |p| p.collider.shape_materials.as_slice())
+    }
+
+    fn shape_filters(&self, part: usize) -> &[(usize, ShapeFilter)] {
+        self.collider(part).map_or(&[], |p| p.collider.shape_filters.as_slice())
     }
 
     fn part_name(&self, part: usize) -> Option<&str> {

@@ -88,7 +88,19 @@ impl ArticulatedBody {
             let (what, expected) = ("index of a shape with a material", "below the number of parts of a compound");
             return Err(BodyError::Range { what, value: *shape as f64, expected });
         }
-        for (_, material) in collider.shape_materials.as_slice() {
+        if let Some((shape, _)) = collider.shape_filters.as_slice().last() {
+            let fine = *shape < count && is_compound(&collider.shape) && collider.one_way.is_none();
+            let expected = "below the number of parts of a compound that collides on all sides";
+            if !fine {
+                return Err(BodyError::Range {
+                    what: "index of a shape with a filter",
+                    value: *shape as f64,
+                    expected,
+                });
+            }
+        }
+        let own = collider.shape_materials.as_slice().iter().map(|(_, own)| own);
+        for material in std::iter::once(&collider.material).chain(own) {
             material.validate().map_err(|(what, value, expected)| BodyError::Range { what, value, expected })?;
         }
         match collider.one_way.map(|direction: Vec3| direction.norm()) {

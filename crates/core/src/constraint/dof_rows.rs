@@ -1,5 +1,5 @@
 //! Rows of one degree of freedom with one position, of a joint of an articulated body or of a loop
-//! joint: limits, dry friction, damping and drive. The equations are in `articulated/model/dof.rs`.
+//! joint: limits, dry friction, damping, spring and drive. The equations are in `articulated/model/dof.rs`.
 
 use super::rows::RowSet;
 use crate::articulated::{DofSettings, Drive};
@@ -16,6 +16,8 @@ pub(crate) struct DofState<'a> {
     /// rad/s or m/s.
     pub v: f64,
     pub settings: &'a DofSettings,
+    /// Limits of `q`; `None` for a component of a rotation.
+    pub limits: Option<[f64; 2]>,
 }
 
 impl Level {
@@ -36,7 +38,7 @@ impl DofState<'_> {
     /// Returns the rows of the limits: sign of the row's velocity, and gap; the lower limit first.
     pub fn limits(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
         let q = self.q;
-        let gaps = self.settings.limits.map(|[lo, hi]| [(1.0, q - lo), (-1.0, hi - q)]);
+        let gaps = self.limits.map(|[lo, hi]| [(1.0, q - lo), (-1.0, hi - q)]);
         gaps.into_iter().flatten().filter(|(_, gap)| gap.is_finite())
     }
 
@@ -60,6 +62,15 @@ impl DofState<'_> {
         }
     }
 
+    /// Returns the target of the row of a spring by the implicit midpoint rule, with its own position `q`, if it is a row.
+    pub fn spring(&self, level: Level, q: f64) -> Option<RowTarget> {
+        let (spring, soft) = (self.settings.spring.filter(|s| s.stiffness > 0.0)?, level.soft_step()?);
+        let h = level.h();
+        let velocity = self.v - 4.0 * (q - spring.rest) * soft / (h * h);
+        let compliance = 4.0 / (spring.stiffness * h * h);
+        Some(RowTarget { velocity, compliance, share: level.share(), ..RowTarget::new(RowSet::Equality, 0.0) })
+    }
+
     /// Calls `row` with the targets of the rows of dry friction, damping and drive. Damping and a position
     /// drive without a limit are one row: two springs in parallel.
     pub fn forces(&self, level: Level, time: f64, mut row: impl FnMut(RowTarget)) {
@@ -80,7 +91,7 @@ impl DofState<'_> {
     /// which hold for any strength of the drive. At the end of a step the joint is then exactly at
     /// the limit.
     fn within_limits(&self, level: Level, target: f64) -> f64 {
-        let Some([lo, hi]) = self.settings.limits else { return target };
+        let Some([lo, hi]) = self.limits else { return target };
         let (down, up) = match level.step() {
             // the view is that of the middle of the step
             Some(h) => ((lo - (self.q - 0.5 * h * self.v)) / h, (hi - (self.q - 0.5 * h * self.v)) / h),

@@ -9,6 +9,7 @@ use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPh
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::surfaces::PairSurfaces;
 use crate::contact::time_of_impact::MovingPair;
+use crate::object::FilteredPart;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
@@ -354,6 +355,7 @@ impl NarrowPhase<'_> {
                 mode,
                 shapes: [shape_a, shape_b],
                 tests: OwnTests::of([(entry_a.object, part_a), (entry_b.object, part_b)]),
+                filtered: FilteredPart::pair([(body_a, part_a), (body_b, part_b)]),
                 part_states: [state_a, state_b],
                 skipped: &[],
             },
@@ -412,14 +414,21 @@ impl NarrowPhase<'_> {
 }
 
 /// Returns whether two parts are to be tested: one of them moves (or is kinematic and approaches a
-/// sleeping object), none is a sensor, and both collision groups allow it.
+/// sleeping object), none is a sensor, and both collision groups allow it. Shapes with filters of their own are not compared.
 pub(crate) fn may_collide(a: &Entry, part_a: usize, b: &Entry, part_b: usize, part_states: &[PartState]) -> bool {
     let (Some(ca), Some(cb)) = (a.object.collidable(), b.object.collidable()) else { return false };
     let wakes = a.asleep && b.approaches(part_states) || b.asleep && a.approaches(part_states);
     if !(wakes || a.moves() && ca.part_moves(part_a) || b.moves() && cb.part_moves(part_b)) {
         return false;
     }
-    if ca.is_sensor(part_a) || cb.is_sensor(part_b) || a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
+    if a.serial == b.serial && !ca.parts_collide(part_a, part_b) {
+        return false;
+    }
+    // shapes with filters of their own are compared one by one, when their contacts are found
+    if !(ca.shape_filters(part_a).is_empty() && cb.shape_filters(part_b).is_empty()) {
+        return true;
+    }
+    if ca.is_sensor(part_a) || cb.is_sensor(part_b) {
         return false;
     }
     ca.collides_with(part_a, cb.collision_group(part_b)) && cb.collides_with(part_b, ca.collision_group(part_a))

@@ -94,9 +94,12 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
+    /// Returns the shape of a part; `None` also for one whose shapes have filters of their own, since another part may meet only
+    /// some of them.
     pub fn shape(&self, part: u32) -> Option<&Shape> {
         let owner = &self.owners[part as usize];
-        self.objects.at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
+        let (body, part) = (self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize);
+        body.shape(part).filter(|_| body.shape_filters(part).is_empty())
     }
 
     fn moves(&self, part: u32) -> bool {

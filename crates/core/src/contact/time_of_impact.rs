@@ -25,6 +25,7 @@
 use super::coplanar::{FacePlane, HALF_SPACE};
 use super::detect::{ContactConstraint, Owner};
 use super::own_tests::OwnTests;
+use crate::object::FilteredPart;
 use crate::object::collidable::Collidable;
 use crate::object::part_state::PartState;
 use crate::rigid::rotation::turn;
@@ -72,6 +73,8 @@ pub(crate) struct MovingPair<'a> {
     pub mode: ContactMode,
     pub shapes: [&'a Shape; 2],
     pub tests: OwnTests<'a>,
+    /// The parts, if shapes of them have filters of their own.
+    pub filtered: Option<[FilteredPart<'a>; 2]>,
     pub part_states: [&'a PartState; 2],
     /// Features of contacts that are not found.
     pub skipped: &'a [u64],
@@ -108,7 +111,14 @@ impl MovingPair<'_> {
     /// Finds the contacts at two poses, ordered by feature.
     pub fn contacts_at(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
         found.clear();
-        self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found);
+        match self.filtered {
+            None => self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found),
+            Some([a, b]) => {
+                for [a, b] in a.contact_pairs(&b) {
+                    self.tests.contacts(self.mode, [&a, &b], poses.each_ref(), margin, found);
+                }
+            }
+        }
         found.retain(|contact| !self.skipped.contains(&contact.feature));
         found.sort_by_key(|contact| contact.feature);
     }
@@ -233,9 +243,9 @@ pub(crate) fn moving_pair<'a>(
         let owner = owners[index as usize];
         let (object, part) = (objects.at(owner.place as usize).object, owner.part as usize);
         let body: &dyn Collidable = object.collidable()?;
-        Some((body.shape(part)?, body.contact_mode(part), (object, part)))
+        Some((body.shape(part)?, body.contact_mode(part), (object, part), (body, part)))
     };
-    let ((shape_a, mode_a, side_a), (shape_b, mode_b, side_b)) = part(a).zip(part(b))?;
+    let ((shape_a, mode_a, side_a, part_a), (shape_b, mode_b, side_b, part_b)) = part(a).zip(part(b))?;
     let mut part_states = [a, b].map(|index| &part_states[index as usize]);
     let mut shapes = [shape_a, shape_b];
     if let Some(plane) = plane {
@@ -246,6 +256,8 @@ pub(crate) fn moving_pair<'a>(
         mode: mode_a.of_pair(mode_b),
         shapes,
         tests: OwnTests::of([side_a, side_b]),
+        // parts with filters form no planes
+        filtered: FilteredPart::pair([part_a, part_b]).filter(|_| plane.is_none()),
         part_states,
         skipped: &[],
     })

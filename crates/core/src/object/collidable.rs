@@ -1,6 +1,6 @@
 //! The trait of objects with parts that collide: shapes, materials and filters (thesis §IV.A.3).
 
-use super::{Intersect, Material};
+use super::{Intersect, Material, ShapeFilter};
 use tumble_collide::{ContactMode, Shape, Vec3};
 
 /// Collision group of a part, 0 to 63 (thesis `CollisionObjectType`). Pairs are filtered by group.
@@ -65,6 +65,12 @@ pub trait Collidable {
     /// Returns the surface constants of single shapes of a part, for those that have their own: the
     /// index of a compound's part with its constants, ascending. None by default.
     fn shape_materials(&self, part: usize) -> &[(usize, Material)] {
+        let _ = part;
+        &[]
+    }
+    /// Returns what single shapes of a part collide with, for those that have a filter of their own: the index of a compound's
+    /// part with its filter, ascending. The others have that of the part. None by default.
+    fn shape_filters(&self, part: usize) -> &[(usize, ShapeFilter)] {
         let _ = part;
         &[]
     }

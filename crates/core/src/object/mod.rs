@@ -20,6 +20,7 @@ pub(crate) mod mesh_key;
 pub(crate) mod mounts;
 pub(crate) mod net_sync;
 pub(crate) mod part_state;
+mod shape_filters;
 mod shape_materials;
 pub(crate) mod visual;
 
@@ -35,6 +36,8 @@ pub use intersect::Intersect;
 pub use material::{Combine, Material};
 pub use mounts::{CameraCarrier, LightCarrier};
 pub use net_sync::{NetSync, SyncError};
+pub(crate) use shape_filters::{FilterClass, FilteredPart, has_sensor};
+pub use shape_filters::{ShapeFilter, ShapeFilters, shape_meeting};
 pub use shape_materials::ShapeMaterials;
 pub use visual::Renderable;
 

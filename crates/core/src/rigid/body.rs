@@ -5,7 +5,7 @@ use super::{BodyError, LockedAxes};
 use crate::object::collidable::CollisionGroup;
 use crate::object::mounts::{CameraMount, LightMount};
 use crate::object::visual::Visual;
-use crate::object::{Intersect, Material, ShapeMaterials};
+use crate::object::{Intersect, Material, ShapeFilter, ShapeFilters, ShapeMaterials};
 use nalgebra::Translation3;
 use std::sync::Arc;
 use tumble_collide::{ContactMode, Mat3, Pose, Shape, Vec3};
@@ -62,6 +62,8 @@ pub struct RigidBody {
     pub(super) intersect: Option<Arc<dyn Intersect>>,
     /// Constants of parts of its compound, ascending.
     pub(super) shape_materials: ShapeMaterials,
+    /// Filters of parts of its compound, ascending.
+    pub(super) shape_filters: ShapeFilters,
     /// Name of a shape that is no compound.
     pub(crate) shape_name: Option<String>,
 }
@@ -124,6 +126,7 @@ impl RigidBody {
             lights: Vec::new(),
             intersect: None,
             shape_materials: ShapeMaterials::default(),
+            shape_filters: ShapeFilters::default(),
             shape_name: None,
         }
     }
@@ -292,6 +295,43 @@ impl RigidBody {
         self.shape_materials.as_slice()
     }
 
+    /// Sets what one shape collides with, and whether it is a sensor: the part of its compound with this index. The others have group,
+    /// mask and sensor of the body.
+    ///
+    /// ```
+    /// use tumble_core::collide::{CompoundPart, CompoundShape};
+    /// use tumble_core::prelude::*;
+    /// use tumble_core::{CollisionGroup, ShapeFilter};
+    /// let shapes = [0.0, 1.0].map(|x| CompoundPart::new(Shape::sphere(0.1).unwrap(), Pose::translation(x, 0.0, 0.0)));
+    /// let body = RigidBody::new(Shape::Compound(CompoundShape::new(shapes.into())?.into()));
+    /// let feeler = ShapeFilter { sensor: true, ..ShapeFilter::default() };
+    /// let body = body.with_shape_filter(1, feeler);
+    /// assert_eq!((body.shape_filter(0).sensor, body.shape_filter(1).sensor), (false, true));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_shape_filter(mut self, shape: usize, filter: ShapeFilter) -> Self {
+        self.set_shape_filter(shape, Some(filter));
+        self
+    }
+
+    /// Sets what one shape collides with, or removes it. A body in a world is changed by
+    /// [`World::change_body`](crate::World::change_body).
+    pub fn set_shape_filter(&mut self, shape: usize, filter: Option<ShapeFilter>) {
+        self.shape_filters.set(shape, filter);
+    }
+
+    /// Returns what one shape collides with: its own filter, or that of the body.
+    pub fn shape_filter(&self, shape: usize) -> ShapeFilter {
+        let own = ShapeFilter { group: self.group, mask: self.mask, sensor: self.sensor };
+        self.shape_filters.get(shape).unwrap_or(own)
+    }
+
+    /// Returns the shapes with filters of their own, ascending.
+    pub fn shape_filters(&self) -> &[(usize, ShapeFilter)] {
+        self.shape_filters.as_slice()
+    }
+
     /// Sets the name of its shape. A compound has none: its [parts](tumble_collide::CompoundPart::with_name) have.
     #[must_use]
     pub fn with_shape_name(mut self, name: impl Into<String>) -> Self {
@@ -431,6 +471,13 @@ impl RigidBody {
         if let Some((shape, _)) = self.shape_materials().last() {
             let expected = "below the number of parts of the body's compound";
             range("index of a shape with a material", *shape as f64, *shape < parts, expected)?;
+        }
+        if let Some((shape, _)) = self.shape_filters().last() {
+            let expected = "below the number of parts of the body's compound";
+            range("index of a shape with a filter", *shape as f64, *shape < parts, expected)?;
+            let own = self.one_way.is_none() && self.intersect.is_none();
+            let expected = "0 on a one-sided body and on one with an intersection test of its own";
+            range("number of shapes with filters", self.shape_filters().len() as f64, own, expected)?;
         }
         if let Some(name) = &self.shape_name {
             check_shape_name(name, &self.shape)?;

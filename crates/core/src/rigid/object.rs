@@ -11,7 +11,7 @@ use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointL
 use crate::object::visual::Visual;
 use crate::object::{
     CameraCarrier, Collidable, Energy, Integratable, Intersect, LightCarrier, Material, Momentum, MomentumKind,
-    NetSync, Object, Renderable, SyncError,
+    NetSync, Object, Renderable, ShapeFilter, SyncError,
 };
 use crate::world::view::WorldView;
 use nalgebra::{ComplexField, Translation3, Unit};
@@ -430,6 +430,10 @@ impl Collidable for RigidBody {
 
     fn shape_materials(&self, _part: usize) -> &[(usize, Material)] {
         self.shape_materials.as_slice()
+    }
+
+    fn shape_filters(&self, _part: usize) -> &[(usize, ShapeFilter)] {
+        self.shape_filters.as_slice()
     }
 
     fn shape_name(&self, _part: usize, shape: usize) -> Option<&str> {

@@ -43,6 +43,7 @@ impl World {
     /// state is in the world. `None` if it was removed or has another type.
     pub fn get_mut<T: Object>(&mut self, id: ObjectId) -> Option<&mut T> {
         self.core.wake(id);
+        self.note_drives(id);
         let place = self.core.table.place(id)?;
         let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();
         object.downcast_mut()

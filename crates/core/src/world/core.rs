@@ -9,8 +9,8 @@ use crate::derived::{Cache, Derived};
 use crate::each_object::first_object;
 use crate::integrators::context::IntegrationContext;
 use crate::linearize::Branches;
-use crate::object::Object;
 use crate::object::part_state::{Forces, PartState, Wrench};
+use crate::object::{Object, has_sensor};
 use crate::report::StepReport;
 use crate::rigid::RigidBody;
 use crate::sensor::loads::FrameLoads;
@@ -574,7 +574,7 @@ impl Core {
 /// nothing.
 fn may_settle(object: &dyn Object) -> bool {
     let any: &dyn std::any::Any = object;
-    let sensor = || object.collidable().is_some_and(|c| (0..c.parts()).any(|part| c.is_sensor(part)));
+    let sensor = || object.collidable().is_some_and(has_sensor);
     any.is::<RigidBody>()
         && object.constraint().is_none()
         && object.force().is_none()

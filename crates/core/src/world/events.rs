@@ -11,8 +11,10 @@
 use super::{ContactPoint, Core, World, WorldState};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::own_tests::OwnTests;
+use crate::object::{FilterClass, FilteredPart};
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use tumble_collide::{Aabb, Contact, Pose, Shape, Vec3};
 
 /// Kind of an event.
@@ -107,8 +109,8 @@ impl Event {
 /// addition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct Touching {
-    /// Whether the first side is a sensor.
-    sensor: bool,
+    /// 0 for a contact. 1 if the first side is a sensor; 1 plus the index of the shape if only that shape is one.
+    sensor: u32,
     /// Serial and part of either side.
     pair: [u32; 4],
 }
@@ -193,7 +195,7 @@ impl World {
             let [a, part_a, b, part_b] = touching.pair;
             let other = match (a == serial, b == serial) {
                 (true, _) => (b, part_b),
-                (_, true) if !touching.sensor => (a, part_a),
+                (_, true) if touching.sensor == 0 => (a, part_a),
                 _ => return None,
             };
             Some((self.core.table.order[self.core.by_serial(other.0)?], other.1 as usize))
@@ -253,15 +255,15 @@ impl Core {
         self.events.clear();
         let pairs = self.touched_pairs();
         let known = self.open_touching();
-        let contact = |pair: [u32; 4]| Touching { sensor: false, pair };
+        let contact = |pair: [u32; 4]| Touching { sensor: 0, pair };
         let mut touching: Vec<Touching> = pairs.iter().map(|p| contact(p.pair)).collect();
         let mut later = pairs.iter().map(|p| p.pair).peekable();
-        for &old in known.iter().filter(|t| !t.sensor) {
+        for &old in known.iter().filter(|t| t.sensor == 0) {
             while later.next_if(|pair| *pair < old.pair).is_some() {}
             if later.peek() != Some(&old.pair) {
                 match self.sleeps(&old) {
                     true => touching.push(old),
-                    false => self.add_event(EventKind::ContactEnd, old.pair),
+                    false => self.add_event(EventKind::ContactEnd, &old),
                 }
             }
         }
@@ -287,11 +289,11 @@ impl Core {
             });
         }
         let sensed = self.sensed_pairs();
-        for &old in known.iter().filter(|t| t.sensor && sensed.binary_search(t).is_err()) {
-            self.add_event(EventKind::SensorEnd, old.pair);
+        for &old in known.iter().filter(|t| t.sensor != 0 && sensed.binary_search(t).is_err()) {
+            self.add_event(EventKind::SensorEnd, &old);
         }
         for &new in sensed.iter().filter(|t| known.binary_search(t).is_err()) {
-            self.add_event(EventKind::SensorBegin, new.pair);
+            self.add_event(EventKind::SensorBegin, &new);
         }
         touching.extend(sensed);
         touching.sort_unstable();
@@ -315,7 +317,7 @@ impl Core {
         }
         self.open_touching_of = changes;
         let settled = |serial: u32| self.by_serial(serial).is_some_and(|place| self.table.walk.is_settled(place));
-        let closed = |t: &Touching| !t.sensor && settled(t.pair[0]) && settled(t.pair[2]) && self.sleeps(t);
+        let closed = |t: &Touching| t.sensor == 0 && settled(t.pair[0]) && settled(t.pair[2]) && self.sleeps(t);
         self.state.touching.iter().filter(|t| !closed(t)).copied().collect()
     }
 
@@ -368,11 +370,13 @@ impl Core {
     }
 
     /// Adds an event without an impulse.
-    fn add_event(&mut self, kind: EventKind, [a, part_a, b, part_b]: [u32; 4]) {
+    fn add_event(&mut self, kind: EventKind, touching: &Touching) {
+        let [a, part_a, b, part_b] = touching.pair;
         let (Some(a), Some(b)) = (self.by_serial(a), self.by_serial(b)) else { return };
         let (a, b) = (self.table.order[a], Some(self.table.order[b]));
         let (part_a, part_b) = (part_a as usize, part_b as usize);
-        self.events.push(Event { part_a, part_b, ..Event::of(kind, a, b) });
+        let shape_a = touching.sensor.saturating_sub(1) as usize;
+        self.events.push(Event { part_a, shape_a, part_b, ..Event::of(kind, a, b) });
     }
 
     fn add_sleep_events(&mut self, before: &WorldState) {
@@ -399,25 +403,39 @@ impl Core {
             let entries = walked.chain(all).filter(|e| e.status.enabled && e.status.collidable);
             entries.filter_map(|e| Some((e, e.object.collidable()?))).flat_map(move |(entry, body)| {
                 let parts = entry.state_range.parts.clone().enumerate();
-                parts.filter(move |(part, _)| body.is_sensor(*part) == sensors).filter_map(move |(part, row)| {
+                parts.filter_map(move |(part, row)| {
                     let pose = self.derived.part_states[row].pose;
-                    Some(SensedPart { entry, part, shape: body.shape(part)?, pose })
+                    Some(SensedPart { entry, side: FilteredPart::of(body, part)?, pose })
                 })
             })
         };
-        let sensors: Vec<(SensedPart<'_>, Aabb)> =
-            parts(true).map(|sensor| (sensor, sensor.shape.aabb(&sensor.pose))).collect();
+        let sensors: Vec<Trigger<'_>> = parts(true)
+            .flat_map(|part| {
+                let own = part.side.sensors().into_iter();
+                own.map(move |(class, number, shape)| Trigger {
+                    around: shape.aabb(&part.pose),
+                    part,
+                    class,
+                    number,
+                    shape,
+                })
+            })
+            .collect();
         let mut found = Vec::new();
         if sensors.is_empty() {
             return found;
         }
         let mut contacts = Vec::new();
         for part in parts(false) {
-            let bounds = part.shape.aabb(&part.pose);
-            for (sensor, around) in &sensors {
-                if around.overlaps(&bounds) && self.senses(sensor, &part, &mut contacts) {
-                    let (a, b) = (sensor.entry.serial, part.entry.serial);
-                    found.push(Touching { sensor: true, pair: [a, sensor.part as u32, b, part.part as u32] });
+            if part.side.solid().is_none() {
+                continue;
+            }
+            let bounds = part.side.shape.aabb(&part.pose);
+            for trigger in &sensors {
+                if trigger.around.overlaps(&bounds) && self.senses(trigger, &part, &mut contacts) {
+                    let (sensor, other) = (trigger.part.entry.serial, part.entry.serial);
+                    let pair = [sensor, trigger.part.side.part as u32, other, part.side.part as u32];
+                    found.push(Touching { sensor: 1 + trigger.number, pair });
                 }
             }
         }
@@ -425,27 +443,23 @@ impl Core {
         found
     }
 
-    fn senses(&self, sensor: &SensedPart<'_>, other: &SensedPart<'_>, contacts: &mut Vec<Contact>) -> bool {
-        let (Some(a), Some(b)) = (sensor.entry.object.collidable(), other.entry.object.collidable()) else {
-            return false;
-        };
+    fn senses(&self, trigger: &Trigger<'_>, other: &SensedPart<'_>, contacts: &mut Vec<Contact>) -> bool {
+        let sensor = &trigger.part;
         let fixed = |entry: &Entry<'_>| entry.status.mode == Mode::Static;
-        let (part_a, part_b) = (sensor.part, other.part);
-        if fixed(&sensor.entry) && fixed(&other.entry)
-            || sensor.entry.serial == other.entry.serial
-            || !a.collides_with(part_a, b.collision_group(part_b))
-            || !b.collides_with(part_b, a.collision_group(part_a))
-        {
+        if fixed(&sensor.entry) && fixed(&other.entry) || sensor.entry.serial == other.entry.serial {
             return false;
         }
-        let surface = |p: &SensedPart<'_>, material| (self.table.order[p.entry.place], p.part, material);
+        let (FilteredPart { body: a, part: part_a, .. }, FilteredPart { body: b, part: part_b, .. }) =
+            (sensor.side, other.side);
+        let Some(shape) = other.side.sensed_by(&sensor.side, &trigger.class) else { return false };
+        let surface = |p: &SensedPart<'_>, material| (self.table.order[p.entry.place], p.side.part, material);
         if self.pair_materials.ignores(surface(sensor, a.material(part_a)), surface(other, b.material(part_b))) {
             return false;
         }
         contacts.clear();
         let mode = a.contact_mode(part_a).of_pair(b.contact_mode(part_b));
         let tests = OwnTests::of([(sensor.entry.object, part_a), (other.entry.object, part_b)]);
-        tests.contacts(mode, [sensor.shape, other.shape], [&sensor.pose, &other.pose], 0.0, contacts);
+        tests.contacts(mode, [&trigger.shape, &shape], [&sensor.pose, &other.pose], 0.0, contacts);
         !contacts.is_empty()
     }
 }
@@ -454,7 +468,16 @@ impl Core {
 #[derive(Clone, Copy)]
 struct SensedPart<'a> {
     entry: Entry<'a>,
-    part: usize,
-    shape: &'a Shape,
+    side: FilteredPart<'a>,
     pose: Pose,
+}
+
+/// A sensor: a whole part, or a shape of one.
+struct Trigger<'a> {
+    part: SensedPart<'a>,
+    class: FilterClass,
+    /// Index of the shape; 0 for a whole part.
+    number: u32,
+    shape: Cow<'a, Shape>,
+    around: Aabb,
 }

@@ -5,6 +5,7 @@ mod bodies;
 mod body_view;
 mod contacts_of;
 mod core;
+mod drives;
 mod error;
 pub(crate) mod events;
 mod frame_states;
@@ -69,6 +70,7 @@ pub struct World {
     /// Part states before the frame, for objects with a frame state; empty if there are none.
     parts_before: Vec<PartState>,
     names: BTreeMap<Arc<str>, ObjectId>,
+    first_drives: drives::FirstDrives,
 }
 
 impl Default for World {
@@ -102,6 +104,7 @@ impl World {
             contacts_before: Vec::new(),
             parts_before: Vec::new(),
             names,
+            first_drives: drives::FirstDrives::default(),
         }
     }
 
@@ -470,6 +473,7 @@ impl World {
     /// [`WorldError::Stale`] if the object was removed before.
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
+        self.forget_drives(id);
         let core = &mut self.core;
         core.own_caches();
         let (place, gone) = core.table.remove(id).ok_or(WorldError::Stale)?;
@@ -499,7 +503,8 @@ impl World {
 
     /// Returns an independent copy, which moves as this world does, bit for bit.
     pub fn fork(&self) -> World {
-        World::of(self.core.fork(), self.stepper.fork(), self.names.clone())
+        let first_drives = self.first_drives.clone();
+        World { first_drives, ..World::of(self.core.fork(), self.stepper.fork(), self.names.clone()) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Saving and restoring.
 //!
-//! A snapshot is a header and the [`WorldState`]. Shapes, masses and settings belong to the scene
-//! and are not in it. It is restored into a world of the same objects, which the header checks by
+//! A snapshot is a header, the [`WorldState`], and the drives that the program has changed (`drives.rs`). Shapes, masses and all
+//! other settings belong to the scene and are not in it. It is restored into a world of the same objects, which the header checks by
 //! their names and sizes. The sweep order of the broad phase is left out: its pairs come sorted, so
 //! no result depends on it.
 
@@ -54,10 +54,14 @@ impl std::fmt::Display for Label {
 }
 
 impl World {
-    /// Returns the complete state of the world as bytes: the same bytes for the same state.
+    /// Returns the complete state of the world as bytes: the same bytes for the same state. Drives that the program has set since
+    /// their objects were added are part of it; masses and all other settings are not. Of a recorded motion it has only that it is
+    /// the one with which the object was added.
     pub fn save(&self) -> Vec<u8> {
         let snapshot = (Header { magic: MAGIC, objects: self.labels() }, &self.core.state);
-        postcard::to_stdvec(&snapshot).unwrap_or_default() // writing plain numbers to memory cannot fail
+        let mut bytes = postcard::to_stdvec(&snapshot).unwrap_or_default(); // writing plain numbers to memory cannot fail
+        self.save_drives(&mut bytes);
+        bytes
     }
 
     /// Restores a saved state. The world must have the same objects in the same order.
@@ -72,10 +76,13 @@ impl World {
         }
         self.check_labels(&header.objects)?;
         let (state, rest) = postcard::take_from_bytes::<WorldState>(rest).map_err(format)?;
-        if !rest.is_empty() {
-            return Err(SnapshotError::Format(format!("{} bytes follow its end", rest.len())));
+        let drives = self.read_drives(rest)?;
+        self.restore_state(&state)?;
+        if !drives.is_empty() {
+            self.set_drives(drives);
+            self.core.set_state(&state); // a change of drives wakes their objects
         }
-        self.restore_state(&state)
+        Ok(())
     }
 
     /// Restores a state of these objects that was read from outside.

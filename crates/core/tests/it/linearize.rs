@@ -355,3 +355,24 @@ fn another_method_is_an_error_with_its_name() {
     let text = world.linearize().unwrap_err().to_string();
     assert_eq!(text, "a step by 'lcp_pyramid' cannot be linearized; set the solver 'gauss_seidel'");
 }
+
+/// Springs and drives of spherical joints far from rest, about all axes at once.
+#[test]
+fn springs_and_drives_of_spherical_joints_agree_with_differences() {
+    let link = |name: &str| {
+        LinkBuilder::new(name, Joint::Spherical)
+            .with_shape(Shape::capsule(0.05, 0.4).unwrap(), Pose::translation(0.05, 0.0, -0.25))
+            .with_density(800.0)
+            .with_rotation(Quat::from_scaled_axis(Vec3::new(0.4, -0.7, 0.3)))
+            .with_velocities(&[1.0, -0.5, 2.0])
+    };
+    let drive = Drive::Position { stiffness: 30.0, damping: 2.0, target: 0.3, velocity: 0.1, limit: f64::INFINITY };
+    let second = link("second").with_parent("first").with_pose(Pose::translation(0.0, 0.0, -0.5)).with_drive(drive);
+    let first = link("first").with_spring(20.0, 0.2).with_joint_damping(0.1);
+    let mut world = exact_world(1.0 / 240.0);
+    world.add(ArticulationBuilder::new("arm").link(first).link(second).build().unwrap()).unwrap();
+    let step = world.linearize().unwrap();
+    let off = error_of(&step, &joined(&step), &by_differences(&world, &step, 1.0));
+    println!("{off:.1e}");
+    assert!(off < 1e-7, "{off:e}");
+}

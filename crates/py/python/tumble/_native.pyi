@@ -17,6 +17,7 @@ from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
+_BodyOrLink: TypeAlias = RigidBody | Articulation | str | tuple[Articulation | str, str]
 _Object: TypeAlias = (
     RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
 )
@@ -449,6 +450,20 @@ class RigidBody:
         """Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
 
         shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
+        """
+    def shape_filter(self, shape: int | str) -> dict[str, Any]:
+        """Returns what one shape collides with: a dict by the names of ``set_shape_filter``, with the mask as the bits of an integer.
+
+        shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
+        """
+    def set_shape_filter(
+        self, shape: int | str, *, group: int | None = None, mask: int | Sequence[int] | None = None, sensor: bool | None = None
+    ) -> None:
+        """Sets collision group, mask and sensor of one shape, the part of a ``Compound``, by the names of the properties of the body. A sensor has
+        no contacts; ``events`` reports the bodies that overlap it, with its number.
+
+        shape: name or index of the part. What is not given stays as it is, for a shape without its own as the body has it at
+        this time. Without any, the shape is as the body again.
         """
     def set_shape_material(
         self,
@@ -911,9 +926,10 @@ class Action:
         orientations: shape (n, 4), by default none. smoothness: ``"c1"`` or ``"c2"``; ends: ``"rest"``, ``"free"`` or ``"loop"``.
         """
     @staticmethod
-    def drive(joint: _Object, target: float) -> Action:
+    def drive(joint: _Object, target: float, *, dof: int = 0) -> Action:
         """Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
-        ``"ARTICULATION/LINK"`` for the joint that moves the link.
+        ``"ARTICULATION/LINK"`` for the joint that moves the link. dof: the degree of freedom of that joint, from 0, in the order of
+        ``Joint.dofs``; of a spherical joint a component of its rotation vector.
         """
     @staticmethod
     def camera(name: str | None = None, *, eye: ArrayLike | None = None, target: ArrayLike | None = None, vertical_fov: float = 0.6981317007977318) -> Action:
@@ -1133,7 +1149,7 @@ class Joint:
         """Rate of the position, rad/s or m/s."""
     @property
     def limits(self) -> tuple[float, float] | None:
-        """Limits of the position, (lower, upper), rad or m, or None."""
+        """Limits of the position, (lower, upper), rad or m, or None. One of them may be infinite."""
     @limits.setter
     def limits(self, value: ArrayLike | None) -> None: ...
     @property
@@ -1271,22 +1287,26 @@ class JointDof:
         """Rate of the position, rad/s or m/s; of a ``"spherical"`` joint the angular velocity about the axis."""
     @property
     def limits(self) -> tuple[float, float] | None:
-        """Limits of the position, (lower, upper), rad or m, or None."""
+        """Limits of the position, (lower, upper), rad or m, or None. One of them may be infinite."""
     @limits.setter
     def limits(self, value: ArrayLike | None) -> None: ...
     @property
     def max_velocity(self) -> float:
-        """Largest speed of the position, rad/s or m/s; infinite for none."""
+        """Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
+        for none.
+        """
     @max_velocity.setter
     def max_velocity(self, value: float) -> None: ...
     @property
     def damping(self) -> float:
-        """Viscous damping, N·m·s/rad or N·s/m."""
+        """Viscous damping along the position, of a ``"spherical"`` joint about each axis, N·m·s/rad or N·s/m."""
     @damping.setter
     def damping(self, value: float) -> None: ...
     @property
     def friction(self) -> float:
-        """Dry friction: largest torque or force, N·m or N."""
+        """Dry friction along the position: largest torque or force, N·m or N. Of a ``"spherical"`` joint about each
+        axis.
+        """
     @friction.setter
     def friction(self, value: float) -> None: ...
     @property
@@ -1296,7 +1316,7 @@ class JointDof:
     def stiffness(self, value: float) -> None: ...
     @property
     def rest(self) -> float:
-        """Position at which its spring is at rest, rad or m."""
+        """Position at which its spring is at rest, rad or m; for a ``"spring"`` its ``length``."""
     @rest.setter
     def rest(self, value: float) -> None: ...
     @property
@@ -1306,7 +1326,9 @@ class JointDof:
     def effort(self, value: float) -> None: ...
     @property
     def armature(self) -> float:
-        """Inertia of its rotor, as the joint meets it, kg·m² or kg."""
+        """Inertia of its rotor, as the joint meets it, kg·m² or kg: it acts between ``a`` and ``b`` against accelerations of the
+        position. Kinds with a length have none.
+        """
     @armature.setter
     def armature(self, value: float) -> None: ...
     def set_drive(
@@ -1356,12 +1378,12 @@ class ArticulationBuilder:
         joint_friction: float = 0.0,
         armature: float = 0.0,
         stiffness: float = 0.0,
-        rest: float = 0.0,
-        drive: Mapping[str, float] | None = None,
+        rest: ArrayLike = 0.0,
+        drive: Mapping[str, Any] | None = None,
         max_velocity: float | None = None,
         effort: float | None = None,
-        q: float | None = None,
-        qd: float | None = None,
+        q: ArrayLike | None = None,
+        qd: ArrayLike | None = None,
         friction: float = 0.5,
         restitution: float = 0.0,
         collidable: bool = True,
@@ -1370,6 +1392,15 @@ class ArticulationBuilder:
         contacts: Contacts = "surface",
         group: int = 0,
         mask: int | Sequence[int] | None = None,
+        twist_limits: ArrayLike | None = None,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1389,9 +1420,15 @@ class ArticulationBuilder:
         armature: inertia of the rotor of a revolute, prismatic or spherical joint, as the joint meets it, kg·m² or kg.
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
-        ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-        start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
-        between its axis, x, y or z, on the link and on the parent, rad.
+        ``Articulation.set_drive``. q, qd: position and velocity of the joint at the start, by its numbers in ``Articulation.q`` and ``qd``: a
+        number of a revolute or prismatic joint; a unit quaternion, shape (4,), and the angular velocity in the axes of the link, shape
+        (3,), of a spherical one; position and quaternion in the world, shape (7,), and (6,), of a floating one. A spherical joint has
+        settings about each axis of the link: rest and the target of its drive may be rotation vectors, shape (3,), a number is for each
+        component. cone: largest angle of a spherical joint between its axis, x, y or z, on the link and on the parent, rad; twist_limits:
+        (lower, upper) of the turn of the link about that axis, rad.
+
+        friction, restitution, and the other constants of surfaces, contacts, group, mask, collidable: of the shapes, as the
+        properties of ``RigidBody``. color: sRGB, shape (3,).
         """
     def add_shape(
         self,
@@ -1412,14 +1449,22 @@ class ArticulationBuilder:
         mask: int | Sequence[int] | None = None,
         color: ArrayLike | None = None,
         visible: bool = True,
+        static_friction: float | None = None,
+        stribeck_speed: float | None = None,
+        friction_scale: ArrayLike | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
+        tangential_restitution: float | None = None,
+        adhesion: float | None = None,
+        surface_velocity: ArrayLike | None = None,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
         shape that collides on one side only, as in ``World.add_rigid``. sensor: no contacts; ``events`` reports the bodies that
         overlap it.
 
-        mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
-        by default those of the link. visible: whether it is drawn.
+        mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, the other constants of surfaces,
+        contacts, group, mask, color: by default those of the link. visible: whether it is drawn.
         """
     def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
         """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
@@ -1709,8 +1754,15 @@ class Articulation:
     @stiffness.setter
     def stiffness(self, value: ArrayLike) -> None: ...
     @property
+    def twist_limits(self) -> _Floats:
+        """Limits of the twist about each axis of a spherical joint, shape (dof, 2), rad; infinite without any, and for all other joints. Settable
+        like ``limits``, whose rows for such a joint are 0 and the largest angle of its cone about that axis.
+        """
+    @twist_limits.setter
+    def twist_limits(self, value: ArrayLike) -> None: ...
+    @property
     def rest(self) -> _Floats:
-        """Rest position of the spring of each degree of freedom, shape (dof,), rad or m. Settable like ``joint_damping``."""
+        """Rest position of the spring of each degree of freedom, shape (dof,), rad or m, of a spherical joint a rotation vector. Settable like ``joint_damping``."""
     @rest.setter
     def rest(self, value: ArrayLike) -> None: ...
     @property
@@ -1783,14 +1835,15 @@ class Articulation:
         self,
         joint: str,
         *,
-        target: float | None = None,
-        velocity: float | None = None,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         stiffness: float = 0.0,
         damping: float = 0.0,
         max_force: float | None = None,
     ) -> None:
-        """Sets the drive of a revolute or prismatic joint of a body in a world, by the name of the
-        joint.
+        """Sets the drive of a revolute, prismatic or spherical joint of a body in a world, by the name of the
+        joint. Target and velocity of a spherical joint are a rotation vector in the frame of the joint and an angular velocity in the
+        axes of the link, shape (3,); a number is for each component.
 
         With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
         ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
@@ -2680,7 +2733,8 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> NDArray[np.void]:
         """Returns where rays enter bodies: a structured array with one row per ray.
 
@@ -2695,8 +2749,9 @@ class World:
 
         A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
         only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies (a handle, a name or a
-        list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
+        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+        name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
+        with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
         """
     def cast_shape(
         self,
@@ -2708,7 +2763,8 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
         """Returns the first body that a shape touches if it moves along a direction without rotation, or
         None.
@@ -2726,12 +2782,13 @@ class World:
         *,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> NDArray[np.void]:
         """Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``,
         ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
 
-        position, orientation: as in ``add_rigid``. group, mask, ignore: as in ``cast_rays``.
+        position, orientation: as in ``add_rigid``. group, mask, ignore, as_body: as in ``cast_rays``.
         """
     def closest_points(
         self,
@@ -2742,7 +2799,8 @@ class World:
         orientation: ArrayLike | None = None,
         group: int = 0,
         mask: int | Sequence[int] | None = None,
-        ignore: _Body | Sequence[_Body] | None = None,
+        ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
+        as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
         """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
         if ``b`` is None. None if a body has no shape or is disabled.
@@ -2750,17 +2808,17 @@ class World:
         a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
         negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
         for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
-        the first. group, mask, ignore: of a shape, as in ``cast_rays``.
+        the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.
         """
     def contains(
-        self, point: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, point: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None, as_body: _BodyOrLink | None = None
     ) -> NDArray[np.int64]:
         """Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
 
-        point: shape (3,), m. The surface belongs to a body. group, mask, ignore: as in ``cast_rays``.
+        point: shape (3,), m. The surface belongs to a body. group, mask, ignore, as_body: as in ``cast_rays``.
         """
     def point_depth(
-        self, points: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _Body | Sequence[_Body] | None = None
+        self, points: ArrayLike, *, group: int = 0, mask: int | Sequence[int] | None = None, ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None, as_body: _BodyOrLink | None = None
     ) -> Any:
         """Returns how deep points lie in the bodies: one row for a point of shape (3,), a structured
         array for points of shape (n, 3), m.

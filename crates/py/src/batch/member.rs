@@ -179,7 +179,6 @@ pub fn change(layout: &Layout, inner: &mut Inner, mut each: impl FnMut(&mut DofS
             let mut settings = before.clone();
             each(&mut settings)?;
             if settings.drive != before.drive {
-                inner.note_drives(body.id);
                 let own = inner.world.get_mut::<ArticulatedBody>(body.id).ok_or_else(gone)?;
                 own.set_dof(index, settings)?;
             }

@@ -6,7 +6,7 @@ use crate::choices::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
 use crate::errors::{Error, Result};
 use crate::objects::binding::{Binding, Now, Source, Which, locked, start};
 use crate::objects::description::alone;
-use crate::objects::joints::{drive, result};
+use crate::objects::joints::{component, drive, result};
 use crate::objects::place::{Place, hash};
 use crate::objects::robot::Robot;
 use crate::pool;
@@ -402,8 +402,9 @@ impl Articulation {
         result(py, &rows, out, &[3])
     }
 
-    /// Sets the drive of a revolute or prismatic joint of a body in a world, by the name of the
-    /// joint.
+    /// Sets the drive of a revolute, prismatic or spherical joint of a body in a world, by the name of the
+    /// joint. Target and velocity of a spherical joint are a rotation vector in the frame of the joint and an angular velocity in the
+    /// axes of the link, shape (3,); a number is for each component.
     ///
     /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
     /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
@@ -414,20 +415,27 @@ impl Articulation {
         &self,
         py: Python<'_>,
         joint: &str,
-        target: Option<f64>,
-        velocity: Option<f64>,
+        target: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
-        let (place, index) = (self.in_world()?, self.dof_of(joint)?);
+        let (place, (first, count)) = (self.in_world()?, self.dofs_of(joint)?);
+        let each = |name: &str, value: Option<&Bound<'_, PyAny>>| match value {
+            Some(value) => (0..count).map(|k| component(name, value, k, count).map(Some)).collect::<Result<Vec<_>>>(),
+            None => Ok(vec![None; count]),
+        };
+        let (targets, velocities) = (each("target", target)?, each("velocity", velocity)?);
         place.write(py, |inner| {
             let body = inner.world.get::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let before = body.dofs()[index].clone();
-            let drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(before.effort))?;
             let mut body = body.clone();
-            body.set_dof(index, DofSettings { drive, ..before })?;
-            inner.note_drives(place.id);
+            for k in 0..count {
+                let before = body.dofs()[first + k].clone();
+                let most = max_force.unwrap_or(before.effort);
+                let drive = drive(targets[k], velocities[k], stiffness, damping, most)?;
+                body.set_dof(first + k, DofSettings { drive, ..before })?;
+            }
             *inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())? = body;
             Ok(())
         })

@@ -6,14 +6,15 @@ use crate::errors::{Error, Result};
 use crate::objects::appearance::palette;
 use crate::objects::articulation::Articulation;
 use crate::objects::body::inertia;
-use crate::objects::joints::drive_of;
+use crate::objects::joints::{component, drive_at};
+use crate::objects::shape_material::Given;
 use crate::objects::shapes::Shape;
 use crate::world::query;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard};
 use tumble::collide::{ContactMode, Mat3, Vec3};
-use tumble::dynamics::{Appearance, ArticulationBuilder as Builder, Joint, LinkBuilder, LinkMass, Material};
+use tumble::dynamics::{Appearance, ArticulationBuilder as Builder, Joint, LinkBuilder, LinkMass, Material, Spring};
 
 /// Makes an articulated body link by link, without a file.
 ///
@@ -80,17 +81,25 @@ impl ArticulationBuilder {
     /// armature: inertia of the rotor of a revolute, prismatic or spherical joint, as the joint meets it, kg·m² or kg.
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
-    /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-    /// start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
-    /// between its axis, x, y or z, on the link and on the parent, rad.
+    /// ``Articulation.set_drive``. q, qd: position and velocity of the joint at the start, by its numbers in ``Articulation.q`` and ``qd``: a
+    /// number of a revolute or prismatic joint; a unit quaternion, shape (4,), and the angular velocity in the axes of the link, shape
+    /// (3,), of a spherical one; position and quaternion in the world, shape (7,), and (6,), of a floating one. A spherical joint has
+    /// settings about each axis of the link: rest and the target of its drive may be rotation vectors, shape (3,), a number is for each
+    /// component. cone: largest angle of a spherical joint between its axis, x, y or z, on the link and on the parent, rad; twist_limits:
+    /// (lower, upper) of the turn of the link about that axis, rad.
+    ///
+    /// friction, restitution, and the other constants of surfaces, contacts, group, mask, collidable: of the shapes, as the
+    /// properties of ``RigidBody``. color: sRGB, shape (3,).
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None))]
+        armature=0.0, stiffness=0.0, rest=None, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
+        twist_limits=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
         joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=True, color=None, cone=None, \
-        contacts='surface', group=0, mask=None)"
+        contacts='surface', group=0, mask=None, twist_limits=None, static_friction=None, stribeck_speed=None, \
+        friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -113,12 +122,12 @@ impl ArticulationBuilder {
         joint_friction: f64,
         armature: f64,
         stiffness: f64,
-        rest: f64,
+        rest: Option<&Bound<'_, PyAny>>,
         drive: Option<&Bound<'_, PyDict>>,
         max_velocity: Option<f64>,
         effort: Option<f64>,
-        q: Option<f64>,
-        qd: Option<f64>,
+        q: Option<&Bound<'_, PyAny>>,
+        qd: Option<&Bound<'_, PyAny>>,
         friction: f64,
         restitution: f64,
         collidable: bool,
@@ -127,6 +136,15 @@ impl ArticulationBuilder {
         contacts: &str,
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
+        twist_limits: Option<&Bound<'_, PyAny>>,
+        static_friction: Option<f64>,
+        stribeck_speed: Option<f64>,
+        friction_scale: Option<&Bound<'_, PyAny>>,
+        rolling_friction: Option<f64>,
+        torsional_friction: Option<f64>,
+        tangential_restitution: Option<f64>,
+        adhesion: Option<f64>,
+        surface_velocity: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
@@ -139,38 +157,53 @@ impl ArticulationBuilder {
             JointType::Fixed => Joint::Fixed,
             JointType::Floating => Joint::Floating,
         };
+        let surface = Given::new(
+            [
+                Some(friction),
+                Some(restitution),
+                static_friction,
+                stribeck_speed,
+                rolling_friction,
+                torsional_friction,
+                tangential_restitution,
+                adhesion,
+            ],
+            friction_scale,
+            surface_velocity,
+        )?;
         let mut link = LinkBuilder::new(name, joint)
             .with_pose(pose(position, orientation)?)
             .with_joint_damping(joint_damping)
             .with_joint_friction(joint_friction)
             .with_armature(armature)
-            .with_material(Material { restitution, friction, ..Material::default() })
+            .with_material(surface.over(Material::default()).unwrap_or_default())
             .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
             .with_groups(query::group(group)?, query::mask(mask)?);
         if let Some(parent) = parent {
             self.has(parent)?;
             link = link.with_parent(parent);
         }
-        if stiffness != 0.0 {
-            link = link.with_spring(stiffness, rest);
-        }
         if let Some(limits) = limits {
             link = link.with_limits(pair(limits)?);
         }
-        if let Some(cone) = cone {
+        if cone.is_some() || twist_limits.is_some() {
             let along: Vec<usize> = (0..3).filter(|k| axis[*k] != 0.0).collect();
             let [k] = along[..] else {
                 return Err(Error::value("axis: expected that of the cone, an axis x, y or z of the joint's frame"));
             };
-            link = link.with_cone(k, cone);
-        }
-        if let Some(drive) = drive {
-            link = link.with_drive(drive_of(drive, effort.unwrap_or(f64::INFINITY))?);
+            link = cone.into_iter().fold(link, |link, cone| link.with_cone(k, cone));
+            let twist_limits = twist_limits.map(pair).transpose()?;
+            link = twist_limits.into_iter().fold(link, |link, limits| link.with_twist_limits(k, limits));
         }
         link = max_velocity.into_iter().fold(link, LinkBuilder::with_max_velocity);
         link = effort.into_iter().fold(link, LinkBuilder::with_effort);
-        link = q.into_iter().fold(link, LinkBuilder::with_position);
-        link = qd.into_iter().fold(link, LinkBuilder::with_velocity);
+        link = with_force(link, joint.dof(), (stiffness, rest), drive, effort.unwrap_or(f64::INFINITY))?;
+        if let Some(q) = q {
+            link = link.with_positions(&flat(q, "q")?);
+        }
+        if let Some(qd) = qd {
+            link = link.with_velocities(&flat(qd, "qd")?);
+        }
         let color = match color {
             Some(color) => vec3(color, "color")?.map(|c| c as f32).into(),
             None => palette(self.builder().links().len()),
@@ -189,10 +222,10 @@ impl ArticulationBuilder {
     /// shape that collides on one side only, as in ``World.add_rigid``. sensor: no contacts; ``events`` reports the bodies that
     /// overlap it.
     ///
-    /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
-    /// by default those of the link. visible: whether it is drawn.
+    /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, the other constants of surfaces,
+    /// contacts, group, mask, color: by default those of the link. visible: whether it is drawn.
     #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None, sensor=false, mass=None, density=None,
-        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true))]
+        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -212,11 +245,33 @@ impl ArticulationBuilder {
         mask: Option<&Bound<'_, PyAny>>,
         color: Option<&Bound<'_, PyAny>>,
         visible: bool,
+        static_friction: Option<f64>,
+        stribeck_speed: Option<f64>,
+        friction_scale: Option<&Bound<'_, PyAny>>,
+        rolling_friction: Option<f64>,
+        torsional_friction: Option<f64>,
+        tangential_restitution: Option<f64>,
+        adhesion: Option<f64>,
+        surface_velocity: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         self.has(link)?;
         if mass.is_some() && density.is_some() {
             return Err(Error::value(format!("shape of link '{link}': expected a mass or a density, not both")));
         }
+        let surface = Given::new(
+            [
+                friction,
+                restitution,
+                static_friction,
+                stribeck_speed,
+                rolling_friction,
+                torsional_friction,
+                tangential_restitution,
+                adhesion,
+            ],
+            friction_scale,
+            surface_velocity,
+        )?;
         let one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         let mode = contacts.map(|contacts| meaning("contacts", contacts, ContactMode::NAMES)).transpose()?;
         let (group, mask) =
@@ -228,8 +283,7 @@ impl ArticulationBuilder {
         let mut collider = known.collider(shape.solid.clone(), pose).with_sensor(sensor);
         collider.contact_mode = mode.unwrap_or(collider.contact_mode);
         (collider.group, collider.mask) = (group.unwrap_or(collider.group), mask.unwrap_or(collider.mask));
-        collider.material.friction = friction.unwrap_or(collider.material.friction);
-        collider.material.restitution = restitution.unwrap_or(collider.material.restitution);
+        collider.material = surface.over(collider.material).unwrap_or(collider.material);
         (collider.one_way, collider.name) = (one_way, shape.name.clone());
         let with = match collidable {
             true => known.clone().with_collider(collider),
@@ -272,6 +326,40 @@ impl ArticulationBuilder {
         let builder = self.builder();
         let links: Vec<&str> = builder.links().iter().map(LinkBuilder::name).collect();
         format!("<tumble.ArticulationBuilder {links:?}>")
+    }
+}
+
+/// Sets the spring and the drive of each degree of freedom of a joint.
+fn with_force(
+    mut link: LinkBuilder,
+    count: usize,
+    (stiffness, rest): (f64, Option<&Bound<'_, PyAny>>),
+    drive: Option<&Bound<'_, PyDict>>,
+    effort: f64,
+) -> Result<LinkBuilder> {
+    // of several degrees of freedom each has its own component
+    let count = if count == 3 { 3 } else { 1 };
+    let common = link.dof().clone();
+    for k in 0..count {
+        let mut dof = common.clone();
+        if stiffness != 0.0 {
+            let rest = rest.map_or(Ok(0.0), |rest| component("rest", rest, k, count))?;
+            dof.spring = Some(Spring { stiffness, rest });
+        }
+        if let Some(drive) = drive {
+            dof.drive = drive_at(drive, effort, k, count)?;
+        }
+        link = if count == 1 { link.with_dof(dof) } else { link.with_dof_at(k, dof) };
+    }
+    Ok(link)
+}
+
+/// Converts a number, or numbers in a row.
+fn flat(value: &Bound<'_, PyAny>, name: &str) -> Result<Vec<f64>> {
+    let Numbers { shape, data } = numbers(value, name)?;
+    match shape.len() {
+        0 | 1 => Ok(data),
+        _ => Err(Error::value(format!("{name}: expected a number, or numbers in a row, got {}", shown(&shape)))),
     }
 }
 

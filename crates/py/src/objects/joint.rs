@@ -4,6 +4,7 @@ use crate::arrays::convert::{Numbers, numbers, shown, vector};
 use crate::errors::{Error, Result};
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
+use crate::objects::dof_settings::{DofSpot, dof_properties};
 use crate::objects::handle::handle;
 use crate::objects::joint_dof::JointDof;
 use crate::objects::joints::drive;
@@ -11,7 +12,7 @@ use crate::objects::place::{Place, found};
 use crate::world::gc::Anchor;
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Spring, Transmission};
+use tumble::dynamics::{DofSettings, JointForce, LoopJoint, LoopJointKind, Transmission};
 
 /// A joint between two bodies, or a body and the world, made by ``World.add_joint``.
 ///
@@ -36,12 +37,8 @@ impl Joint {
         self.place.write(py, |inner| inner.world.change_joint(self.place.id, change))
     }
 
-    fn change_dof(&self, py: Python<'_>, change: impl FnOnce(&mut DofSettings)) -> Result<()> {
-        self.change(py, |joint| {
-            let mut dof = joint.dof().clone();
-            change(&mut dof);
-            Ok(joint.set_dof(dof)?)
-        })
+    fn spot(&self) -> DofSpot<'_> {
+        DofSpot { place: &self.place, k: None }
     }
 
     fn transmission<T>(&self, kind: LoopJointKind, get: impl FnOnce(&Transmission) -> T) -> Result<T> {
@@ -93,6 +90,8 @@ impl Joint {
     }
 }
 
+dof_properties!(Joint);
+
 #[pymethods]
 impl Joint {
     /// Kind of the joint.
@@ -137,18 +136,6 @@ impl Joint {
         Ok(self.motion()?[1])
     }
 
-    /// Limits of the position, (lower, upper), rad or m, or None.
-    #[getter]
-    fn limits(&self) -> Result<Option<(f64, f64)>> {
-        self.constant(|joint| joint.dof().limits.map(|[lower, upper]| (lower, upper)))
-    }
-
-    #[setter]
-    fn set_limits(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
-        let limits = value.map(pair).transpose()?;
-        self.change_dof(py, |dof| dof.limits = limits)
-    }
-
     /// Largest swing of a ``"spherical"`` joint, rad, or None: its axis on ``a`` stays in this cone about that on ``b``.
     #[getter]
     fn cone(&self) -> Result<Option<f64>> {
@@ -174,94 +161,6 @@ impl Joint {
     fn set_twist_limits(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
         let limits = value.map(pair).transpose()?;
         self.change(py, |joint| Ok(joint.set_twist_limits(limits)?))
-    }
-
-    /// Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known.
-    #[getter]
-    fn effort(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().effort)
-    }
-
-    #[setter]
-    fn set_effort(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change_dof(py, |dof| dof.effort = value)
-    }
-
-    /// Inertia of its rotor, as the joint meets it, kg·m² or kg: it acts between ``a`` and ``b`` against accelerations of the
-    /// position. Kinds with a length have none.
-    #[getter]
-    fn armature(&self) -> Result<f64> {
-        self.constant(LoopJoint::armature)
-    }
-
-    #[setter]
-    fn set_armature(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |joint| Ok(joint.set_armature(value)?))
-    }
-
-    /// Largest speed of the position, of a ``"spherical"`` joint that about each axis, rad/s or m/s; infinite
-    /// for none.
-    #[getter]
-    fn max_velocity(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().max_velocity)
-    }
-
-    #[setter]
-    fn set_max_velocity(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change_dof(py, |dof| dof.max_velocity = value)
-    }
-
-    /// Viscous damping along the position, of a ``"spherical"`` joint about each axis, N·m·s/rad or N·s/m.
-    #[getter]
-    fn damping(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().damping)
-    }
-
-    #[setter]
-    fn set_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change_dof(py, |dof| dof.damping = value)
-    }
-
-    /// Dry friction along the position: largest torque or force, N·m or N. Of a ``"spherical"`` joint about each
-    /// axis.
-    #[getter]
-    fn friction(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().friction)
-    }
-
-    #[setter]
-    fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change_dof(py, |dof| dof.friction = value)
-    }
-
-    /// Stiffness of its spring, N·m/rad or N/m; 0 without one.
-    #[getter]
-    fn stiffness(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().spring.map_or(0.0, |spring| spring.stiffness))
-    }
-
-    #[setter]
-    fn set_stiffness(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |joint| {
-            let rest =
-                joint.dof().spring.map_or(if joint.kind().has_length() { joint.length() } else { 0.0 }, |s| s.rest);
-            let dof = DofSettings { spring: Some(Spring { stiffness: value, rest }), ..joint.dof().clone() };
-            Ok(joint.set_dof(dof)?)
-        })
-    }
-
-    /// Position at which its spring is at rest, rad or m; for a ``"spring"`` its ``length``.
-    #[getter]
-    fn rest(&self) -> Result<f64> {
-        self.constant(|joint| joint.dof().spring.map_or(0.0, |spring| spring.rest))
-    }
-
-    #[setter]
-    fn set_rest(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change_dof(py, |dof| {
-            let stiffness = dof.spring.map_or(0.0, |spring| spring.stiffness);
-            dof.spring = Some(Spring { stiffness, rest: value });
-        })
     }
 
     /// Length of a ``"distance"``, largest length of a ``"rope"``, length of a ``"spring"`` at rest,
@@ -360,10 +259,6 @@ impl Joint {
     ) -> Result<()> {
         let target = target.map(|value| numbers(value, "target")).transpose()?;
         let velocity = velocity.map(|value| numbers(value, "velocity")).transpose()?;
-        self.place.write(py, |inner| {
-            inner.note_drives(self.place.id);
-            Ok(())
-        })?;
         self.change(py, |joint| {
             let count = joint.kind().dofs();
             let of_each = [&target, &velocity].into_iter().flatten().any(|numbers| !numbers.shape.is_empty());

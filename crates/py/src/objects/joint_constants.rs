@@ -5,7 +5,7 @@ use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::binding::Binding;
 use crate::objects::robot::Robot;
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::dynamics::{ArticulatedBody, DofSettings, Joint, Spring};
@@ -31,23 +31,37 @@ impl Articulation {
 
     /// Sets lower and upper limits of all degrees of freedom of a body in a world.
     pub(super) fn change_limits(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        let (place, dof, limits) = (self.in_world()?, self.robot.dof(), bounds(value, "limits")?);
+        self.change_bounds(py, ("limits", value), |dof, limits| dof.limits = limits)
+    }
+
+    fn change_bounds(
+        &self,
+        py: Python<'_>,
+        (name, value): (&str, &Bound<'_, PyAny>),
+        set: impl Fn(&mut DofSettings, Option<[f64; 2]>),
+    ) -> Result<()> {
+        let (place, dof, limits) = (self.in_world()?, self.robot.dof(), bounds(value, name)?);
         if limits.shape != [dof, 2] {
             let shape = shown(&limits.shape);
-            return Err(Error::value(format!("limits: expected shape ({dof}, 2), got {shape}")));
+            return Err(Error::value(format!("{name}: expected shape ({dof}, 2), got {shape}")));
         }
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
             let mut changed = body.clone();
             for (index, pair) in limits.data.chunks_exact(2).enumerate() {
-                let limits = (pair[0].is_finite() || pair[1].is_finite()).then_some([pair[0], pair[1]]);
-                let settings = changed.dofs()[index].clone();
-                changed.set_dof(index, DofSettings { limits, ..settings })?;
+                let mut settings = changed.dofs()[index].clone();
+                set(&mut settings, limits_of(pair));
+                changed.set_dof(index, settings)?;
             }
             *body = changed;
             Ok(())
         })
     }
+}
+
+/// Returns limits; none if both are infinite.
+fn limits_of(pair: &[f64]) -> Option<[f64; 2]> {
+    (pair[0].is_finite() || pair[1].is_finite()).then_some([pair[0], pair[1]])
 }
 
 /// Returns the spring with another constant; none without stiffness and rest.
@@ -135,7 +149,25 @@ impl Articulation {
         })
     }
 
-    /// Rest position of the spring of each degree of freedom, shape (dof,), rad or m. Settable like ``joint_damping``.
+    /// Limits of the twist about each axis of a spherical joint, shape (dof, 2), rad; infinite without any, and for all other joints. Settable
+    /// like ``limits``, whose rows for such a joint are 0 and the largest angle of its cone about that axis.
+    #[getter]
+    fn twist_limits<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
+        let none = [f64::NEG_INFINITY, f64::INFINITY];
+        let rows: Vec<Vec<f64>> =
+            self.spot.dofs()?.iter().map(|dof| dof.twist_limits.unwrap_or(none).to_vec()).collect();
+        match rows.is_empty() {
+            true => Ok(PyArray2::<f64>::zeros(py, [0, 2], false).into_any()),
+            false => Ok(PyArray2::from_vec2(py, &rows).map_err(|e| Error::value(e.to_string()))?.into_any()),
+        }
+    }
+
+    #[setter]
+    fn set_twist_limits(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        self.change_bounds(py, ("twist_limits", value), |dof, limits| dof.twist_limits = limits)
+    }
+
+    /// Rest position of the spring of each degree of freedom, shape (dof,), rad or m, of a spherical joint a rotation vector. Settable like ``joint_damping``.
     #[getter]
     fn rest<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         self.of_dofs(py, |dof| dof.spring.map_or(0.0, |spring| spring.rest))

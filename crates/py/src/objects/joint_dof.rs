@@ -2,12 +2,13 @@
 
 use crate::errors::{Error, Result};
 use crate::objects::builder::pair;
+use crate::objects::dof_settings::{DofSpot, dof_properties};
 use crate::objects::joints::{drive, drive_of};
 use crate::objects::place::Place;
 use crate::world::gc::Anchor;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::dynamics::{DofSettings, Drive, LoopJoint, Spring};
+use tumble::dynamics::{Drive, LoopJoint, Spring};
 
 /// One degree of freedom that a joint leaves free: a member of ``Joint.dofs``. Its settings are those of the joint,
 /// and can change between steps.
@@ -25,18 +26,8 @@ impl JointDof {
         Ok(JointDof { place, k, anchor })
     }
 
-    fn constant<T>(&self, get: impl FnOnce(&DofSettings) -> T) -> Result<T> {
-        self.place.read(|inner| inner.world.get::<LoopJoint>(self.place.id)?.dof_at(self.k).map(get))
-    }
-
-    fn change(&self, py: Python<'_>, change: impl FnOnce(&mut DofSettings) -> Result<()>) -> Result<()> {
-        self.place.write(py, |inner| {
-            inner.world.change_joint(self.place.id, |joint| {
-                let mut dof = joint.dof_at(self.k).cloned().unwrap_or_default();
-                change(&mut dof)?;
-                Ok::<(), Error>(joint.set_dof_at(self.k, dof)?)
-            })
-        })
+    fn spot(&self) -> DofSpot<'_> {
+        DofSpot { place: &self.place, k: Some(self.k) }
     }
 
     fn motion(&self) -> Result<[f64; 2]> {
@@ -47,6 +38,8 @@ impl JointDof {
         })
     }
 }
+
+dof_properties!(JointDof);
 
 #[pymethods]
 impl JointDof {
@@ -62,121 +55,6 @@ impl JointDof {
         Ok(self.motion()?[1])
     }
 
-    /// Limits of the position, (lower, upper), rad or m, or None.
-    #[getter]
-    fn limits(&self) -> Result<Option<(f64, f64)>> {
-        self.constant(|dof| dof.limits.map(|[lower, upper]| (lower, upper)))
-    }
-
-    #[setter]
-    fn set_limits(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
-        let limits = value.map(pair).transpose()?;
-        self.change(py, |dof| {
-            dof.limits = limits;
-            Ok(())
-        })
-    }
-
-    /// Largest speed of the position, rad/s or m/s; infinite for none.
-    #[getter]
-    fn max_velocity(&self) -> Result<f64> {
-        self.constant(|dof| dof.max_velocity)
-    }
-
-    #[setter]
-    fn set_max_velocity(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            dof.max_velocity = value;
-            Ok(())
-        })
-    }
-
-    /// Viscous damping, N·m·s/rad or N·s/m.
-    #[getter]
-    fn damping(&self) -> Result<f64> {
-        self.constant(|dof| dof.damping)
-    }
-
-    #[setter]
-    fn set_damping(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            dof.damping = value;
-            Ok(())
-        })
-    }
-
-    /// Dry friction: largest torque or force, N·m or N.
-    #[getter]
-    fn friction(&self) -> Result<f64> {
-        self.constant(|dof| dof.friction)
-    }
-
-    #[setter]
-    fn set_friction(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            dof.friction = value;
-            Ok(())
-        })
-    }
-
-    /// Stiffness of its spring, N·m/rad or N/m; 0 without one.
-    #[getter]
-    fn stiffness(&self) -> Result<f64> {
-        self.constant(|dof| dof.spring.map_or(0.0, |spring| spring.stiffness))
-    }
-
-    #[setter]
-    fn set_stiffness(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            let rest = dof.spring.map_or(0.0, |spring| spring.rest);
-            dof.spring = Some(Spring { stiffness: value, rest });
-            Ok(())
-        })
-    }
-
-    /// Position at which its spring is at rest, rad or m.
-    #[getter]
-    fn rest(&self) -> Result<f64> {
-        self.constant(|dof| dof.spring.map_or(0.0, |spring| spring.rest))
-    }
-
-    #[setter]
-    fn set_rest(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            let stiffness = dof.spring.map_or(0.0, |spring| spring.stiffness);
-            dof.spring = Some(Spring { stiffness, rest: value });
-            Ok(())
-        })
-    }
-
-    /// Force of its motor, N·m or N, above 0: the limit of drives that name none. Infinite if it is not known.
-    #[getter]
-    fn effort(&self) -> Result<f64> {
-        self.constant(|dof| dof.effort)
-    }
-
-    #[setter]
-    fn set_effort(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.change(py, |dof| {
-            dof.effort = value;
-            Ok(())
-        })
-    }
-
-    /// Inertia of its rotor, as the joint meets it, kg·m² or kg.
-    #[getter]
-    fn armature(&self) -> Result<f64> {
-        self.place.read(|inner| inner.world.get::<LoopJoint>(self.place.id)?.armature_at(self.k))
-    }
-
-    #[setter]
-    fn set_armature(&self, py: Python<'_>, value: f64) -> Result<()> {
-        self.place.write(py, |inner| {
-            let change = |joint: &mut LoopJoint| Ok::<(), Error>(joint.set_armature_at(self.k, value)?);
-            inner.world.change_joint(self.place.id, change)
-        })
-    }
-
     /// Sets its drive; the arguments are those of ``Joint.set_drive``.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
     fn set_drive(
@@ -188,11 +66,7 @@ impl JointDof {
         damping: f64,
         max_force: Option<f64>,
     ) -> Result<()> {
-        self.place.write(py, |inner| {
-            inner.note_drives(self.place.id);
-            Ok(())
-        })?;
-        self.change(py, |dof| {
+        self.spot().set(py, |dof| {
             dof.drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(dof.effort))?;
             Ok(())
         })

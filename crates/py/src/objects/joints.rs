@@ -37,20 +37,19 @@ impl Articulation {
         })
     }
 
-    /// Returns the degree of freedom of a revolute or prismatic joint, by the name of the joint.
-    pub fn dof_of(&self, joint: &str) -> Result<usize> {
+    /// Returns the first degree of freedom of a revolute, prismatic or spherical joint and their number, by the name of the joint.
+    pub fn dofs_of(&self, joint: &str) -> Result<(usize, usize)> {
         let number = self.robot.joints.iter().position(|name| name == joint).ok_or_else(|| {
             let names: Vec<&str> = self.robot.joints.iter().map(String::as_str).take(12).collect();
             Error::Name(format!("there is no joint named '{joint}'; there are {}", names.join(", ")))
         })?;
         let link = &self.robot.model.links()[number];
-        if link.joint.dof() != 1 {
-            return Err(Error::value(format!(
-                "joint '{joint}' has {} degrees of freedom; drives need a revolute or prismatic joint",
-                link.joint.dof()
-            )));
+        match link.joint.dof() {
+            count @ (1 | 3) => Ok((link.v, count)),
+            count => Err(Error::value(format!(
+                "joint '{joint}' has {count} degrees of freedom; drives need a revolute, prismatic or spherical joint"
+            ))),
         }
-        Ok(link.v)
     }
 
     /// Sets one setting of all degrees of freedom of a body in a world: a number for all, or shape (dof,). An
@@ -143,6 +142,25 @@ pub fn drive(target: Option<f64>, velocity: Option<f64>, stiffness: f64, damping
 
 /// Returns the drive of a dict with the arguments of ``set_drive``; `effort` is the default of its limit.
 pub fn drive_of(given: &Bound<'_, PyDict>, effort: f64) -> Result<Drive> {
+    drive_at(given, effort, 0, 1)
+}
+
+/// Returns the number of an argument for degree of freedom `k` of `count`: a number is for all of them.
+pub fn component(name: &str, value: &Bound<'_, PyAny>, k: usize, count: usize) -> Result<f64> {
+    let Numbers { shape, data } = numbers(value, name)?;
+    match shape.as_slice() {
+        [] => Ok(data[0]),
+        [n] if *n == count && count > 1 => Ok(data[k]),
+        _ if count == 1 => Err(Error::value(format!("{name}: expected a number, got {}", shown(&shape)))),
+        _ => Err(Error::value(format!(
+            "{name}: expected a number, or shape ({count},) with one for each degree of freedom, got {}",
+            shown(&shape)
+        ))),
+    }
+}
+
+/// Returns the drive of degree of freedom `k` of `count`: target and velocity may have a number for each.
+pub fn drive_at(given: &Bound<'_, PyDict>, effort: f64, k: usize, count: usize) -> Result<Drive> {
     const KEYS: [&str; 5] = ["target", "velocity", "stiffness", "damping", "max_force"];
     let mut values = [None; 5];
     for (key, value) in given {
@@ -150,7 +168,11 @@ pub fn drive_of(given: &Bound<'_, PyDict>, effort: f64) -> Result<Drive> {
         let Some(index) = KEYS.iter().position(|known| *known == key) else {
             return Err(Error::value(format!("drive: `{key}` is not known; there are {}", KEYS.join(", "))));
         };
-        values[index] = value.extract()?;
+        values[index] = match (index, value.is_none()) {
+            (_, true) => None,
+            (0 | 1, _) => Some(component(KEYS[index], &value, k, count)?),
+            _ => value.extract()?,
+        };
     }
     let [target, velocity, stiffness, damping, max_force] = values;
     drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), max_force.unwrap_or(effort))

@@ -28,14 +28,15 @@ fn as_dict<'py>(py: Python<'py>, m: &Material) -> Result<Bound<'py, PyDict>> {
 }
 
 /// Constants that a call sets: the numbers in the order of the arguments, then the vectors.
-struct Given {
+pub struct Given {
     numbers: [Option<f64>; 8],
     scale: Option<[f64; 3]>,
     velocity: Option<[f64; 3]>,
 }
 
 impl Given {
-    fn new(
+    /// Converts the constants, the numbers in the order of the fields of ``as_dict``.
+    pub fn new(
         numbers: [Option<f64>; 8],
         scale: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
@@ -46,7 +47,7 @@ impl Given {
     }
 
     /// Returns the constants with those that are given; `None` if none is.
-    fn over(&self, mut m: Material) -> Option<Material> {
+    pub fn over(&self, mut m: Material) -> Option<Material> {
         let places = [
             &mut m.friction,
             &mut m.restitution,
@@ -70,7 +71,7 @@ impl Given {
 
 /// A shape that a user names or numbers.
 #[derive(FromPyObject)]
-enum Which {
+pub enum Which {
     Number(usize),
     Name(String),
 }
@@ -159,7 +160,7 @@ set_shape_material!(
 );
 
 impl RigidBody {
-    fn numbered(&self, shape: Which) -> Result<usize> {
+    pub fn numbered(&self, shape: Which) -> Result<usize> {
         match shape {
             Which::Number(number) => Ok(number),
             Which::Name(name) => self.shape_number(&name),

@@ -160,10 +160,12 @@ impl Action {
     }
 
     /// Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
-    /// ``"ARTICULATION/LINK"`` for the joint that moves the link.
+    /// ``"ARTICULATION/LINK"`` for the joint that moves the link. dof: the degree of freedom of that joint, from 0, in the order of
+    /// ``Joint.dofs``; of a spherical joint a component of its rotation vector.
     #[staticmethod]
-    fn drive(joint: Given, target: f64) -> Action {
-        Action { deed: Deed::Drive { body: joint, dof: 0, target, original: None } }
+    #[pyo3(signature = (joint, target, *, dof=0))]
+    fn drive(joint: Given, target: f64, #[pyo3(from_py_with = whole_number)] dof: usize) -> Action {
+        Action { deed: Deed::Drive { body: joint, dof, target, original: None } }
     }
 
     /// Looks from a camera by its name, or from an eye at a target, m; vertical_fov: rad.
@@ -231,7 +233,8 @@ impl Action {
         let mut wrong = None;
         let found: Deed<(ObjectId, usize, Option<String>)> = self.deed.map(&mut |given: &Given| {
             let given = given.bind(py);
-            let name = given.extract::<String>().ok();
+            let link = given.extract::<(Bound<'_, PyAny>, String)>().ok().map(|(_, link)| format!("/{link}"));
+            let name = given.extract::<String>().ok().or(link);
             match part_of(world, shared, given) {
                 Ok((id, part)) => (id, part, name),
                 Err(why) => {
@@ -251,7 +254,18 @@ impl Action {
         }
         if let (Deed::Drive { body: (id, _, name), .. }, Deed::Drive { dof, .. }) = (&found, &mut deed) {
             let link = name.as_ref().and_then(|name| Some(name.rsplit_once('/')?.1));
-            *dof = world.get::<ArticulatedBody>(*id).and_then(|body| body.dof_of(link?)).unwrap_or(0);
+            let model = world.get::<ArticulatedBody>(*id).map(|body| body.model());
+            if let Some((model, link)) = model.zip(link) {
+                let moving = model.link(link).map(|number| &model.links()[number]);
+                match moving.filter(|moving| *dof < moving.joint.dof()) {
+                    Some(moving) => *dof += moving.v,
+                    None => {
+                        return Err(Error::value(format!(
+                            "dof: link '{link}' has no degree of freedom {dof} of its joint"
+                        )));
+                    }
+                }
+            }
         }
         Ok(deed)
     }

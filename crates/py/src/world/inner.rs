@@ -5,7 +5,6 @@ use crate::arrays::state::Shown;
 use crate::errors::{Error, Result};
 use crate::extension::callbacks::Extension;
 use crate::objects::robot::Robot;
-use crate::world::drives::Drives;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,8 +21,6 @@ pub struct Inner {
     pub robots: BTreeMap<ObjectId, Arc<Robot>>,
     /// Generalized forces that act on articulated bodies in every frame.
     pub efforts: BTreeMap<ObjectId, Vec<f64>>,
-    /// The drives with which objects were added, of those of which the program changed one.
-    pub first_drives: Drives,
     /// The callbacks of Python in the world: forces, behaviors, callables and intersection tests.
     pub extension: Extension,
     /// The array through which Python sees the state.
@@ -46,7 +43,6 @@ impl Inner {
             scene,
             robots: BTreeMap::new(),
             efforts: BTreeMap::new(),
-            first_drives: Drives::new(),
             extension: Extension::default(),
             shown: Shown::default(),
             notes: Vec::new(),
@@ -65,7 +61,6 @@ impl Inner {
             scene: self.scene.clone(),
             robots: self.robots.clone(),
             efforts: self.efforts.clone(),
-            first_drives: self.first_drives.clone(),
             extension,
             shown: Shown::default(),
             notes: self.notes.clone(),
@@ -129,7 +124,6 @@ impl Inner {
     pub fn forget(&mut self, id: ObjectId) {
         self.robots.remove(&id);
         self.efforts.remove(&id);
-        self.first_drives.remove(&id);
         self.extension.forget(id);
     }
 

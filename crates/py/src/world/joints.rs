@@ -104,7 +104,16 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
         let (damping, friction) = (given.damping, given.friction);
         let max_velocity = given.max_velocity.unwrap_or(f64::INFINITY);
-        joint.set_dof(DofSettings { limits, damping, friction, spring, drive, max_velocity, effort })?;
+        joint.set_dof(DofSettings {
+            limits,
+            damping,
+            friction,
+            spring,
+            drive,
+            max_velocity,
+            effort,
+            ..DofSettings::default()
+        })?;
         joint.set_armature(given.armature)?;
         joint.set_cone(given.cone)?;
         joint.set_twist_limits(twist_limits)?;

@@ -4,7 +4,6 @@ pub mod add;
 pub mod bulk;
 pub mod class;
 pub mod contacts;
-pub mod drives;
 pub mod gc;
 pub mod inner;
 pub mod joints;

@@ -51,11 +51,9 @@ fn side(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Side> {
 fn link_side(inner: &Inner, object: &str, link: &str) -> Result<Side> {
     let id = by_name(inner, object)?.id;
     let body = inner.world.get::<ArticulatedBody>(id);
-    let found = body.and_then(|body| Some((body, body.model().frame(link)?)));
-    let Some((body, frame)) = found else {
+    let Some(parts) = body.and_then(|body| body.parts_of_link(link).ok()) else {
         return Err(Error::Name(format!("'{object}' has no link named '{link}'")));
     };
-    let parts: Vec<usize> = body.colliders_of(frame.link).collect();
     match parts.is_empty() {
         true => Err(Error::value(format!("link '{link}' of '{object}' has no shape that collides"))),
         false => Ok(Side { id, parts: Some(parts) }),

@@ -6,7 +6,6 @@
 use crate::errors::{Error, Result, caught};
 use crate::objects::robot::Robot;
 use crate::objects::shapes::Shape;
-use crate::world::drives;
 use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -14,11 +13,11 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tumble::collide::{Pose, Shape as Solid};
 use tumble::dynamics::archive::{open, seal};
-use tumble::dynamics::{ArchiveError, ArticulatedBody, Drive, ObjectId, World as Core};
+use tumble::dynamics::{ArchiveError, ArticulatedBody, ObjectId, World as Core};
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
-const WORLD: &[u8; 8] = b"tumbleW4";
+const WORLD: &[u8; 8] = b"tumbleW5";
 const SHAPE: &[u8; 8] = b"tumbleG3";
 
 /// A world.
@@ -30,8 +29,6 @@ struct Record {
     robots: Vec<(u32, Vec<String>, Option<Vec<f64>>)>,
     notes: Vec<String>,
     overlaps: Vec<String>,
-    /// Places of objects of which the program changed a drive, and the drives with which they were added.
-    drives: Vec<(u32, Vec<Drive>)>,
 }
 
 /// The stored part of a scene: its name, and the settings of pictures.
@@ -74,7 +71,6 @@ pub fn write(inner: &Inner) -> Result<Vec<u8>> {
         robots: robots.collect(),
         notes: inner.notes.clone(),
         overlaps: inner.overlaps.clone(),
-        drives: (0..).zip(ids).filter_map(|(k, id)| Some((k, inner.first_drives.get(id)?.clone()))).collect(),
     };
     Ok(seal(WORLD, &record)?)
 }
@@ -110,11 +106,6 @@ pub fn read(bytes: &[u8]) -> Result<Inner> {
         let robot = Robot { model: body.model().clone(), base: *body.base(), joints };
         inner.robots.insert(id, Arc::new(robot));
         effort.map(|effort| inner.efforts.insert(id, effort));
-    }
-    for (place, drives) in record.drives {
-        let id = ids.get(place as usize).filter(|id| drives::of(&inner.world, **id).len() == drives.len());
-        let id = id.ok_or_else(|| ArchiveError::Damaged(format!("object {place} has other drives")))?;
-        inner.first_drives.insert(*id, drives);
     }
     inner.expect_forces(&forces);
     (inner.notes, inner.overlaps) = (record.notes, record.overlaps);

@@ -15,7 +15,7 @@ use pyo3::types::{PyInt, PyList, PyTuple};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{BodyDistance, CollisionGroup, ObjectId, QueryFilter, Ray};
+use tumble::dynamics::{ArticulatedBody, BodyDistance, CollisionGroup, ObjectId, QueryFilter, Ray};
 
 /// A field of a structured array: name, whether it holds integers, shape.
 type Field = (&'static str, bool, &'static [usize]);
@@ -86,6 +86,7 @@ pub struct Selection<'a, 'py> {
     pub group: u8,
     pub mask: Option<&'a Bound<'py, PyAny>>,
     pub ignore: Option<&'a Bound<'py, PyAny>>,
+    pub as_body: Option<&'a Bound<'py, PyAny>>,
 }
 
 impl Selection<'_, '_> {
@@ -93,18 +94,60 @@ impl Selection<'_, '_> {
     fn filter(&self, shared: &Arc<Shared>) -> Result<QueryFilter> {
         let mut filter = QueryFilter { group: group(self.group)?, mask: mask(self.mask)?, ..QueryFilter::default() };
         if let Some(ignore) = self.ignore {
-            match own_place(shared, ignore) {
-                Ok(one) => filter.ignored.push(one.id),
+            match named(shared, ignore) {
+                Ok(one) => filter = without(filter, one),
                 Err(_) if !ignore.is_instance_of::<pyo3::types::PyString>() && ignore.try_iter().is_ok() => {
                     for body in ignore.try_iter()? {
-                        filter.ignored.push(own_place(shared, &body?)?.id);
+                        filter = without(filter, named(shared, &body?)?);
                     }
                 }
                 Err(error) => return Err(error),
             }
         }
+        if let Some(body) = self.as_body {
+            filter = match named(shared, body)? {
+                (id, None) => filter.acting_as(id),
+                (id, Some(parts)) => filter.acting_as_parts(id, parts),
+            };
+        }
         Ok(filter)
     }
+}
+
+fn without(filter: QueryFilter, (id, parts): (ObjectId, Option<Vec<usize>>)) -> QueryFilter {
+    match parts {
+        None => filter.ignoring(id),
+        Some(parts) => filter.ignoring_parts(id, parts),
+    }
+}
+
+/// Converts a body, or a link: ``"ARTICULATION/LINK"`` or (articulation, link), with the parts that are its shapes.
+fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Option<Vec<usize>>)> {
+    let of_link = |id: ObjectId, link: &str| {
+        let parts = shared.read(|inner| {
+            let body = inner.world.get::<ArticulatedBody>(id);
+            body.map(|body| Ok(body.parts_of_link(link)?)).unwrap_or_else(|| {
+                Err(Error::Name(format!("'{}' has no link '{link}'", inner.world.name(id).unwrap_or_default())))
+            })
+        })?;
+        Ok((id, Some(parts)))
+    };
+    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
+        return match own_place(shared, &body)? {
+            place if shared.read(|inner| Ok(inner.world.get::<ArticulatedBody>(place.id).is_some()))? => {
+                of_link(place.id, &link)
+            }
+            _ => Err(Error::value("expected an articulation before the name of a link")),
+        };
+    }
+    if let Ok(name) = value.extract::<String>()
+        && let Some((object, link)) = name.rsplit_once('/')
+        && let Some(id) =
+            shared.read(|inner| Ok(inner.world.find(object).filter(|_| inner.world.find(&name).is_none())))?
+    {
+        return of_link(id, link);
+    }
+    own_place(shared, value).map(|place| (place.id, None))
 }
 
 /// Converts the number of a collision group.

@@ -1,5 +1,5 @@
-//! Format of `World.save`: the library's snapshot, followed by the generalized forces on
-//! articulated bodies and by the drives that the program changed (`drives.rs`).
+//! Format of `World.save`: the library's snapshot, which has the drives that the program changed, followed by the generalized
+//! forces on articulated bodies.
 //!
 //! | part | bytes |
 //! |---|---|
@@ -12,11 +12,12 @@
 //! the command.
 
 use crate::errors::Result;
-use crate::world::drives;
 use crate::world::inner::Inner;
 use tumble::dynamics::{ObjectId, SnapshotError};
 
 const MAGIC: [u8; 8] = *b"tumbleT1";
+/// The last bytes of snapshots with drives of versions whose library had none.
+const OLD_DRIVES: &[u8] = b"tumbleD1";
 
 /// Returns the bytes of a world.
 pub fn write(inner: &Inner) -> Vec<u8> {
@@ -35,17 +36,19 @@ pub fn write(inner: &Inner) -> Vec<u8> {
         bytes.extend(len.to_le_bytes());
         bytes.extend(MAGIC);
     }
-    drives::write(inner, &mut bytes);
     bytes
 }
 
 /// Restores a world from its bytes. On an error it keeps its state.
 pub fn read(inner: &mut Inner, bytes: &[u8]) -> Result<()> {
-    let (bytes, drives) = drives::split(bytes)?;
+    if bytes.ends_with(OLD_DRIVES) {
+        let why = "its drives are of an older version of tumble, which wrote 'tumbleD1' at the end";
+        return Err(SnapshotError::Format(why.into()).into());
+    }
     let (snapshot, forces) = split(bytes)?;
     let before = inner.world.save();
     inner.world.restore(snapshot)?;
-    match efforts(inner, forces).and_then(|all| drives::read(inner, drives).map(|()| all)) {
+    match efforts(inner, forces) {
         Ok(all) => inner.efforts = all.into_iter().collect(),
         Err(error) => {
             inner.world.restore(&before)?;

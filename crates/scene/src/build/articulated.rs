@@ -5,10 +5,10 @@ use tumble_core::articulated::{
     ModelError,
 };
 use tumble_core::collide::{Pose, Shape, Vec3, contacts};
-use tumble_core::{Appearance, CameraMount, Joint, Material, Object, Visual};
+use tumble_core::{Appearance, CameraMount, Joint, Material, Object, ShapeFilter, Visual};
 
 use crate::build::appearance::{appearance, material_id};
-use crate::build::shapes::{Placed, Purpose, ShapeMaker, mass, own_materials};
+use crate::build::shapes::{Placed, Purpose, ShapeMaker, mass, own_filters, own_materials};
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::link::{Geometry, LinkSpec};
 
@@ -130,6 +130,8 @@ fn attach(body: &mut ArticulatedBody, link: &str, placed: &Placed<'_>) -> Result
         };
         if let Geometry::Shape(spec) = &placed.spec.geometry {
             collider = own_materials(spec).fold(collider, |made, (n, own)| made.with_shape_material(n, own));
+            let whole = ShapeFilter { group: collider.group, mask: collider.mask, sensor: collider.sensor };
+            collider = own_filters(spec, whole).fold(collider, |made, (n, own)| made.with_shape_filter(n, own));
         }
         body.add_collider(link, collider)?;
     }

@@ -31,8 +31,10 @@ fn set_part(world: &World, spec: &Action<String>, action: &mut Action) {
     }
     if let (Action::Drive { body: name, .. }, Action::Drive { body, dof, .. }) = (spec, action) {
         let link = name.rsplit_once('/').map(|(_, link)| link);
-        let found = world.get::<ArticulatedBody>(*body).and_then(|body| body.dof_of(link?));
-        *dof = found.unwrap_or(0);
+        // in the file it is that of the joint; in the world that of the whole body
+        let model = world.get::<ArticulatedBody>(*body).map(|body| body.model());
+        let first = model.and_then(|model| Some(model.links()[model.link(link?)?].v));
+        *dof += first.unwrap_or(0);
     }
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{CompoundPart, Pose, Shape, ShapeError, TreeCache, TreeSettings, TriMesh, Vec3};
-use tumble_core::{Material, RigidBody, VisualGeometry, VisualMesh};
+use tumble_core::{Material, RigidBody, ShapeFilter, VisualGeometry, VisualMesh};
 
 use crate::build::appearance::material_id;
 use crate::build::mesh_files::{read_file, stretched};
@@ -21,7 +21,7 @@ use crate::build::visual_mesh;
 use crate::notes::NoteList;
 use crate::parse::body::MassSpec;
 use crate::parse::link::{Geometry, LinkMassSpec, LinkShape, LinkSpec};
-use crate::parse::shape::{CompoundPartSpec, PartSurface, ShapeSpec};
+use crate::parse::shape::{CompoundPartSpec, PartFilter, PartSurface, ShapeSpec};
 
 /// A shape or visual with its pose on a link.
 #[derive(Clone)]
@@ -126,6 +126,12 @@ pub(crate) fn own_materials(spec: &ShapeSpec) -> impl Iterator<Item = (usize, Ma
         own.map(|own| (n, Material { id: material_id(own.material), ..own.contact }))
     };
     spec.surfaces().into_iter().enumerate().filter_map(own)
+}
+
+/// Returns the filters of those parts of a compound that have their own, for a body or a link with a filter.
+pub(crate) fn own_filters(spec: &ShapeSpec, body: ShapeFilter) -> impl Iterator<Item = (usize, ShapeFilter)> {
+    let own = move |(n, own): (usize, PartFilter)| Some((n, own.of_part(body)?));
+    spec.filters().into_iter().enumerate().filter_map(own)
 }
 
 fn center(geometry: &VisualGeometry) -> Vec3 {

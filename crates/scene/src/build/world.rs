@@ -5,7 +5,7 @@ use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::solver::SolverSettings;
 use tumble_core::{
     Anchor, ArticulatedBody, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, Material, ObjectId,
-    PairMaterial, PairSide, RigidBody, Settings, Sleep, Template, Visual, World, WorldError,
+    PairMaterial, PairSide, RigidBody, Settings, ShapeFilter, Sleep, Template, Visual, World, WorldError,
 };
 
 use crate::build::appearance::{appearance, material_id};
@@ -171,7 +171,8 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Returns one side of a pair in the world: several parts for a link with several shapes.
+    /// Returns one side of a pair in the world: several parts for a link with several shapes, without those of links that are fixed
+    /// to it.
     fn sides(&self, world: &World, side: PairSideSpec) -> Vec<PairSide> {
         let object = |name: &str| world.find(name).map(PairSide::Object).into_iter().collect();
         match side {
@@ -179,9 +180,12 @@ impl SceneFile {
             PairSideSpec::Articulated(spec) => object(&self.articulated[spec].name),
             PairSideSpec::Material(material) => vec![PairSide::Material(material_id(Some(material)))],
             PairSideSpec::Link(spec, link) => {
-                let Some((id, link)) = self.part(world, &PartSpec::Link(spec, link)) else { return Vec::new() };
-                let body = world.get::<ArticulatedBody>(id);
-                body.into_iter().flat_map(|b| b.colliders_of(b.link_of(link))).map(|p| PairSide::Part(id, p)).collect()
+                let spec = &self.articulated[spec];
+                let found = world.find(&spec.name).and_then(|id| Some((id, world.get::<ArticulatedBody>(id)?)));
+                let Some((id, body)) = found else { return Vec::new() };
+                // the shapes of the link alone: those of fixed links have pairs of their own
+                let parts = body.parts_of_link(&spec.links[link].name).unwrap_or_default();
+                parts.into_iter().map(|part| PairSide::Part(id, part)).collect()
             }
         }
     }
@@ -263,6 +267,8 @@ impl SceneFile {
         (body.gravity_scale, body.locked) = (spec.gravity_scale, spec.locked);
         (body.group, body.mask, body.sensor) = (spec.group, spec.mask, spec.sensor);
         body.one_way = spec.one_way.map(Vec3::from);
+        let whole = ShapeFilter { group: spec.group, mask: spec.mask, sensor: spec.sensor };
+        shapes::own_filters(&spec.shape, whole).for_each(|(n, own)| body.set_shape_filter(n, Some(own)));
         Ok(body)
     }
 

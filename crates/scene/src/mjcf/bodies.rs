@@ -17,7 +17,7 @@ use crate::parse::body::{BodySpec, MassSpec};
 use crate::parse::joint::JointSpec;
 use crate::parse::link::{LinkMassSpec, LinkSpec};
 use crate::parse::mount::Mounts;
-use crate::parse::shape::{CompoundPartSpec, ShapeSpec};
+use crate::parse::shape::{CompoundPartSpec, PartFilter, ShapeSpec};
 use crate::parse::view::GroundSpec;
 
 impl Assembly<'_, '_> {
@@ -252,11 +252,18 @@ impl Assembly<'_, '_> {
         if joint.is_single() || joint.kind == Kind::Ball {
             spec.armature = joint.armature;
         }
+        if let Some(most) = joint.ball_range {
+            spec.cone = Some((2, most));
+            spec.twist_limits = (most <= WIDEST_TWIST).then_some((2, [-most, most]));
+        }
         let effort = joint.actuator_range.map(|[low, high]| high.max(-low)).filter(|most| *most > 0.0);
         spec.dof.effort = effort.filter(|_| joint.is_single()).unwrap_or(f64::INFINITY);
         spec
     }
 }
+
+/// Half of the widest limits of a twist, rad.
+const WIDEST_TWIST: f64 = 0.75 * std::f64::consts::PI;
 
 /// Returns the motion of a joint from its reference position back to 0.
 fn before(joint: &JointItem<'_>) -> Pose {
@@ -294,6 +301,7 @@ fn joined(mut parts: Vec<(&Geom<'_>, ShapeSpec)>) -> (ShapeSpec, Option<String>)
         pose: geom.pose,
         density_kg_per_m3: None,
         surface: None,
+        filter: PartFilter::default(),
         name: geom.name.clone(),
     };
     (ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }, None)

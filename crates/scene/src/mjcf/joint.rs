@@ -32,6 +32,8 @@ pub(super) struct JointItem<'a> {
     pub(super) axis: Vec3,
     /// Limits, spring, damping and dry friction.
     pub(super) dof: DofSettings,
+    /// Largest rotation of a ball joint, rad.
+    pub(super) ball_range: Option<f64>,
     pub(super) armature: f64,
     /// Position in the reference configuration, rad or m.
     pub(super) reference: f64,
@@ -83,19 +85,21 @@ impl<'a> JointItem<'a> {
             true => read_range(&item, "range").map(|range| range.map(turn)),
             false => None,
         };
-        if limited && !single {
-            reader.notes.add(&element, "limits of ball joints are left out");
+        // MuJoCo bounds the whole rotation: that is at least the swing and at least the twist
+        let ball_range = (limited && !single && reader.limits).then(|| read_range(&item, "range")).flatten();
+        let ball_range = ball_range.map(|[_, most]| reader.compiler.angle(most));
+        if ball_range.is_some() {
+            reader
+                .notes
+                .add(&element, "the limit of a ball joint's rotation becomes one of its swing, and one of its twist");
         }
         let rest = turn(item.number("springref", Bound::ANY, 0.0));
         let stiffness = if reader.springs { number("stiffness") } else { 0.0 };
-        if stiffness > 0.0 && !single {
-            reader.notes.add(&element, "springs of ball joints are left out");
-        }
         let dof = DofSettings {
             limits,
             damping: if reader.dampers { number("damping") } else { 0.0 },
             friction: if reader.friction { number("frictionloss") } else { 0.0 },
-            spring: (stiffness > 0.0 && single).then_some(Spring { stiffness, rest }),
+            spring: (stiffness > 0.0).then_some(Spring { stiffness, rest: if single { rest } else { 0.0 } }),
             ..DofSettings::default()
         };
         let clamped = item.limited("actuatorfrclimited", "actuatorfrcrange", reader.compiler.autolimits);
@@ -106,6 +110,7 @@ impl<'a> JointItem<'a> {
             anchor: frame.transform_point(&Vec3::from(item.numbers("pos").unwrap_or([0.0; 3])).into()).coords,
             axis: frame.rotation * axis,
             dof,
+            ball_range,
             armature: number("armature"),
             reference: if single { turn(item.number("ref", Bound::ANY, 0.0)) } else { 0.0 },
             spring_rest: rest,
@@ -122,6 +127,7 @@ impl<'a> JointItem<'a> {
             anchor: Vec3::zeros(),
             axis: Vec3::z(),
             dof: DofSettings::default(),
+            ball_range: None,
             armature: 0.0,
             reference: 0.0,
             spring_rest: 0.0,

@@ -75,10 +75,11 @@ pub(crate) enum ObjectKind {
     Body { mode: Mode, sensor: bool },
     /// An articulated body, and whether a link of it has a sensor.
     Articulated { sensor: bool },
-    /// One of its links, whether its joint has a drive with a target, and whether that is an angle.
-    Link { driven: bool, turns: bool },
-    /// A loop joint, likewise of its first degree of freedom.
-    Joint { driven: bool, turns: bool },
+    /// One of its links: the number of degrees of freedom of its joint; of each whether it has a drive with a target, and whether it
+    /// is an angle.
+    Link { count: usize, driven: [bool; 3], turns: [bool; 3] },
+    /// A loop joint, likewise.
+    Joint { count: usize, driven: [bool; 3], turns: [bool; 3] },
     /// A coupling of two joints.
     Mimic,
     /// A template, and the number of its bodies.

@@ -83,21 +83,25 @@ pub(crate) fn read_action(
         "move" => read_move(&mut f, names),
         "drive" => {
             let in_degrees = f.value("target_deg").is_some();
+            let dof = read_dof(&mut f);
             let right = |kind| match kind {
-                ObjectKind::Link { driven, turns } | ObjectKind::Joint { driven, turns } => {
-                    driven && (turns || !in_degrees)
+                ObjectKind::Link { driven, turns, .. } | ObjectKind::Joint { driven, turns, .. } => {
+                    driven[dof] && (turns[dof] || !in_degrees)
                 }
                 _ => false,
             };
             let expected = match in_degrees {
-                false => "the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity",
+                false => {
+                    "the name of a loop joint, or \"OBJECT/LINK\", with a `drive` to a position or velocity on that degree of \
+                     freedom: `dof`, by default 0"
+                }
                 true => {
                     "the name of a loop joint, or \"OBJECT/LINK\", that turns and has a `drive`, for a `target_deg`"
                 }
             };
             let body = names.read(&mut f, "drive", right, expected);
             let target = read_target(&mut f);
-            body.map(|body| Action::Drive { body, dof: 0, target, original: None })
+            body.map(|body| Action::Drive { body, dof, target, original: None })
         }
         "camera" => read_camera(&mut f),
         _ => read_light(&mut f, lights),
@@ -105,6 +109,11 @@ pub(crate) fn read_action(
     let log = f.log;
     f.finish();
     action.filter(|_| log.count() == problems)
+}
+
+/// Reads the number of a degree of freedom of a joint, from 0.
+fn read_dof(f: &mut Fields<'_>) -> usize {
+    f.integer_or("dof", 0..=2, 0) as usize
 }
 
 fn read_who(

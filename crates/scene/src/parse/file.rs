@@ -356,14 +356,17 @@ fn object_names(
         let sensor = spec.links.iter().flat_map(|link| &link.shapes).any(|shape| shape.sensor && shape.collidable);
         names.add(&spec.name, ObjectKind::Articulated { sensor });
         for link in &spec.links {
-            let driven = link.joint.is_single() && has_target(&link.joint.dof.drive);
-            let turns = matches!(link.joint.kind, Joint::Revolute { .. });
-            names.add(&format!("{}/{}", spec.name, link.name), ObjectKind::Link { driven, turns });
+            let dofs = if link.joint.kind.dof() <= 3 { link.joint.dofs() } else { Vec::new() };
+            let driven = [0, 1, 2].map(|k| dofs.get(k).is_some_and(|dof| has_target(&dof.drive)));
+            let turns = [matches!(link.joint.kind, Joint::Revolute { .. } | Joint::Spherical); 3];
+            let kind = ObjectKind::Link { count: dofs.len(), driven, turns };
+            names.add(&format!("{}/{}", spec.name, link.name), kind);
         }
     }
     for joint in loop_joints {
-        let driven = joint.dofs.first().is_some_and(|dof| has_target(&dof.settings.drive));
-        names.add(&joint.name, ObjectKind::Joint { driven, turns: joint.kind.turns() });
+        let driven = [0, 1, 2].map(|k| joint.dofs.get(k).is_some_and(|dof| has_target(&dof.settings.drive)));
+        let turns = [0, 1, 2].map(|k| joint.kind.turns_at(k));
+        names.add(&joint.name, ObjectKind::Joint { count: joint.dofs.len(), driven, turns });
     }
     mimics.iter().for_each(|mimic| names.add(&mimic.name, ObjectKind::Mimic));
     templates.iter().for_each(|template| names.add_template(&template.body.name, template.count));

@@ -21,8 +21,10 @@ pub struct JointSpec {
     pub name: String,
     /// The type of joint; its axis has unit length.
     pub kind: Joint,
-    /// Settings of each of its degrees of freedom.
+    /// Settings of each of its degrees of freedom, of those without settings in `dofs`.
     pub dof: DofSettings,
+    /// Settings of the three degrees of freedom of a spherical joint, if they differ; otherwise empty.
+    pub dofs: Vec<DofSettings>,
     /// The joint whose position this one follows.
     pub mimic: Option<MimicSpec>,
     /// Position numbers at time 0, as defined by [`Joint`].
@@ -31,12 +33,16 @@ pub struct JointSpec {
     pub velocity: Vec<f64>,
     /// Cone of a spherical joint: 0, 1 or 2 for axis x, y or z of its frame, and half angle, rad.
     pub cone: Option<(usize, f64)>,
+    /// Limits of the twist of a spherical joint: 0, 1 or 2 for axis x, y or z of the link, and the limits, rad.
+    pub twist_limits: Option<(usize, [f64; 2])>,
     /// Inertia of its rotor, kg·m² or kg, at least 0; 0 unless it has one degree of freedom.
     pub armature: f64,
     /// Largest speed that a URDF states, rad/s or m/s. It is the velocity limit if its options ask for that.
     pub speed: Option<f64>,
     /// Whether a position drive without a target holds the initial position.
     pub(crate) holds_start: bool,
+    /// The same of each of `dofs`.
+    pub(crate) dofs_hold_start: Vec<bool>,
 }
 
 /// `q = multiplier·q_of + offset`.
@@ -146,13 +152,16 @@ impl JointSpec {
             name: name.into(),
             kind,
             dof,
+            dofs: Vec::new(),
             mimic: None,
             position,
             velocity,
             cone: None,
+            twist_limits: None,
             armature: 0.0,
             speed: None,
             holds_start: false,
+            dofs_hold_start: Vec::new(),
         }
     }
 
@@ -186,10 +195,11 @@ impl JointSpec {
         let keys = self.keys();
         match self.kind {
             Joint::Spherical => {
-                self.read_resistance(f, keys);
+                self.read_settings(f, true);
                 self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
-                self.read_own_cone(f);
+                self.read_swing_and_twist(f);
                 self.read_spherical_start(f);
+                self.read_own_dofs(f);
             }
             _ if self.is_single() => {
                 if let Some(position) = number(f, keys.start) {
@@ -219,29 +229,13 @@ impl JointSpec {
         self.read_settings(f, springs);
     }
 
-    /// Reads the cone of a spherical joint of a link, and its axis.
-    fn read_own_cone(&mut self, f: &mut Fields<'_>) {
-        const EXPECTED: &str = "an axis of the joint's frame: [1, 0, 0], [0, 1, 0] or [0, 0, 1]";
-        let Some(cone) = number(f, ("cone_rad", Some("cone_deg"))) else { return };
-        let mut axis = 2;
-        if let Some(value) = f.value("axis") {
-            let problems = f.log.count();
-            let given: [f64; 3] = f.as_vector("axis", value, Bound::ANY);
-            let along: Vec<usize> = (0..3).filter(|k| given[*k] != 0.0).collect();
-            match along[..] {
-                [k] => axis = k,
-                _ if f.log.count() == problems => f.wrong("axis", value, EXPECTED),
-                _ => {}
-            }
-        }
-        self.cone = Some((axis, cone));
-    }
-
     /// Returns the settings of each of its degrees of freedom.
     pub(crate) fn dofs(&self) -> Vec<DofSettings> {
         let of = |k: usize| {
+            let own = self.dofs.get(k).unwrap_or(&self.dof);
             let cone = self.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
-            DofSettings { limits: self.dof.limits.or(cone), ..self.dof.clone() }
+            let twist_limits = self.twist_limits.filter(|(axis, _)| *axis == k).map(|(_, limits)| limits);
+            DofSettings { limits: own.limits.or(cone), twist_limits, ..own.clone() }
         };
         (0..self.kind.dof()).map(of).collect()
     }
@@ -336,8 +330,11 @@ impl JointSpec {
         number(f, self.keys().offset).unwrap_or(0.0)
     }
 
-    /// Sets the target of a position drive without a target to the position at time 0.
+    /// Sets the target of a position drive without a target to the position at time 0, of a spherical joint to the rotation vector.
     pub(crate) fn settle(&mut self) {
+        if self.kind == Joint::Spherical {
+            return self.settle_rotation();
+        }
         if let (true, Drive::Position { target, .. }, Some(start)) =
             (self.holds_start, &mut self.dof.drive, self.position.first())
         {

@@ -4,11 +4,13 @@ use tumble_core::articulated::{DofSettings, Spring};
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{Joint, LoopJointKind};
 
+use crate::parse::ball_joint::check_twist;
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::joint::{JointSpec, number, read_limits};
 use crate::parse::rotation;
+use std::f64::consts::TAU;
 
 /// A part of an object in the description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,6 +173,9 @@ impl LoopJointSpec {
         let cone_rad = spherical.then(|| number(&mut f, ("cone_rad", Some("cone_deg")))).flatten();
         let twist = spherical.then(|| read_limits(&mut f, ("twist_limits_rad", Some("twist_limits_deg"))));
         let twist_limits_rad = twist.flatten().flatten();
+        if spherical {
+            check_twist(&mut f);
+        }
         let dofs = read_dofs(&mut f, kind, Vec3::from(axis));
         let length = length_m.or_else(|| length_at_start(kind, position_m, second_position_m?, ground_m, ratio));
         let limits = dofs.first().and_then(|dof| dof.settings.limits);
@@ -254,7 +259,10 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
     }
     let springs = kind != LoopJointKind::Spring;
     match joints.first_mut() {
-        Some(first) => first.read_loop_dof(f, springs, kind.has_length()),
+        Some(first) => {
+            first.read_loop_dof(f, springs, kind.has_length());
+            check_angle(f, kind, 0);
+        }
         None => refuse_settings(f, kind),
     }
     if spherical {
@@ -262,12 +270,38 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
         joints.fill(first);
     }
     let tables = if count > 1 { f.tables("dof", count) } else { Vec::new() };
-    for (joint, mut table) in joints.iter_mut().zip(tables) {
+    for ((k, joint), mut table) in joints.iter_mut().enumerate().zip(tables) {
         joint.read_loop_dof(&mut table, springs, kind.has_length());
+        check_angle(&mut table, kind, k);
         table.finish();
     }
     let spec = |JointSpec { dof, armature, holds_start, .. }| LoopDofSpec { settings: dof, armature, holds_start };
     joints.into_iter().map(spec).collect()
+}
+
+/// Reports limits of an angle that its joint cannot follow.
+fn check_angle(f: &mut Fields<'_>, kind: LoopJointKind, k: usize) {
+    if kind == LoopJointKind::Spherical || !kind.turns_at(k) {
+        return;
+    }
+    let revolute = kind == LoopJointKind::Revolute;
+    let expected = match revolute {
+        true => "limits at most 2π (360°) apart, or -inf or inf on one side: a revolute joint counts turns only there",
+        false => "limits at most 3π/2 (270°) apart: only a revolute joint follows its angle",
+    };
+    for (key, turn) in [("limits_rad", TAU), ("limits_deg", 360.0)] {
+        let Some(value) = f.value(key) else { continue };
+        if value.get_ref().as_bool() == Some(false) {
+            continue;
+        }
+        let problems = f.log.count();
+        let [lower, upper]: [f64; 2] = f.as_vector(key, value, Bound::LIMIT);
+        let span = upper - lower;
+        let fine = if revolute { span.is_infinite() || span <= turn + 1e-9 } else { span <= 0.75 * turn };
+        if f.log.count() == problems && lower <= upper && !fine {
+            f.wrong(key, value, expected);
+        }
+    }
 }
 
 /// Reports settings of a position of a kind that has none.

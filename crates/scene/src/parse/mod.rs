@@ -2,6 +2,7 @@
 
 pub(crate) mod appearance;
 pub(crate) mod articulated;
+mod ball_joint;
 pub(crate) mod behavior;
 pub(crate) mod body;
 pub(crate) mod bound;

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use tumble_core::Material;
 use tumble_core::collide::{Pose, Shape, ShapeError};
+use tumble_core::{CollisionGroup, Material, ShapeFilter};
 
-use crate::parse::body::{Library, read_material};
+use crate::parse::body::{Library, read_group, read_mask, read_material};
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names};
 use crate::parse::material::{has_contact, read_contact};
@@ -94,6 +94,8 @@ pub struct CompoundPartSpec {
     pub density_kg_per_m3: Option<f64>,
     /// Surface constants of its own. Default: those of the body.
     pub surface: Option<PartSurface>,
+    /// Its group, mask and sensor. Default: those of its body.
+    pub filter: PartFilter,
     /// Name, unlike those of all other shapes of the body or link; none for a compound.
     pub name: Option<String>,
 }
@@ -115,6 +117,47 @@ pub struct PartSurface {
     pub material: Option<usize>,
     /// Contact constants: the part's own, else those of the material that it names, else its body's.
     pub contact: Material,
+}
+
+/// Group, mask and sensor of a part of a compound, as far as they are not those of its body or link.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PartFilter {
+    /// Its collision group.
+    pub group: Option<CollisionGroup>,
+    /// Groups that it collides with, one bit each.
+    pub mask: Option<u64>,
+    /// Whether it has no contacts, and the world reports the bodies that overlap it.
+    pub sensor: Option<bool>,
+}
+
+impl PartFilter {
+    /// Returns this filter with what it lacks from another one.
+    fn or(self, other: PartFilter) -> PartFilter {
+        PartFilter {
+            group: self.group.or(other.group),
+            mask: self.mask.or(other.mask),
+            sensor: self.sensor.or(other.sensor),
+        }
+    }
+
+    /// Returns the filter of a part of a body with the filter `body`; `None` if it has none of its own.
+    pub(crate) fn of_part(self, body: ShapeFilter) -> Option<ShapeFilter> {
+        (self != PartFilter::default()).then(|| ShapeFilter {
+            group: self.group.unwrap_or(body.group),
+            mask: self.mask.unwrap_or(body.mask),
+            sensor: self.sensor.unwrap_or(body.sensor),
+        })
+    }
+
+    fn read(f: &mut Fields<'_>) -> PartFilter {
+        let given = |f: &Fields<'_>, key: &str| f.entries().any(|(name, ..)| name == key);
+        let [group, mask, sensor] = ["group", "mask", "sensor"].map(|key| given(f, key));
+        PartFilter {
+            group: group.then(|| read_group(f, CollisionGroup::default())),
+            mask: mask.then(|| read_mask(f, u64::MAX)),
+            sensor: sensor.then(|| f.flag_or("sensor", false)),
+        }
+    }
 }
 
 /// Meshes and materials that a shape refers to.
@@ -243,6 +286,16 @@ impl ShapeSpec {
         parts.iter().flat_map(of_part).collect()
     }
 
+    /// Returns what each part of a compound collides with, one by one like [`surfaces`](Self::surfaces).
+    pub(crate) fn filters(&self) -> Vec<PartFilter> {
+        let ShapeSpec::Compound { parts } = self else { return vec![PartFilter::default()] };
+        let of_part = |part: &CompoundPartSpec| {
+            let own = part.filter;
+            part.shape.filters().into_iter().map(move |inner| inner.or(own))
+        };
+        parts.iter().flat_map(of_part).collect()
+    }
+
     /// Returns the names of its parts, one by one like [`surfaces`](Self::surfaces).
     fn names(&self) -> Vec<Option<&str>> {
         let ShapeSpec::Compound { parts } = self else { return vec![None] };
@@ -308,8 +361,10 @@ fn read_compound(f: &mut Fields<'_>, context: ShapeContext<'_>) -> Option<ShapeS
         names.check(&part, name.as_deref(), &shape);
         let pose = rotation::read_pose(&mut part);
         let density_kg_per_m3 = part.optional_number("density_kg_per_m3", Bound::POSITIVE);
+        // as the surfaces: only what collides has them
+        let filter = context.surface.map_or(PartFilter::default(), |_| PartFilter::read(&mut part));
         part.finish();
-        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3, surface, name });
+        parts.push(CompoundPartSpec { shape, pose, density_kg_per_m3, surface, filter, name });
     }
     let own = |part: &CompoundPartSpec| part.density_kg_per_m3.is_some() || part.shape.has_density();
     if let Some(n) = parts.iter().position(|part| own(part) != own(&parts[0])) {

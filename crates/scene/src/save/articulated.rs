@@ -1,5 +1,7 @@
 //! `[[articulated]]` of an articulated body as it stands, with the shapes and masses of each link, fixed ones too.
 
+use std::collections::BTreeSet;
+
 use tumble_core::articulated::{DofSettings, Drive, Link, LinkFrame, LinkMass};
 use tumble_core::collide::{ContactMode, Pose, Shape, Vec3};
 use tumble_core::{ArticulatedBody, Collider, Joint, Object, ObjectId, Visual, VisualGeometry};
@@ -82,13 +84,19 @@ impl Writer<'_> {
             Joint::Spherical => (0..3).filter_map(|k| own[k].limits.map(|[_, cone]| (k, cone))).collect(),
             _ => Vec::new(),
         };
-        let without_cone =
-            |dof: &DofSettings| DofSettings { limits: dof.limits.filter(|_| cones.is_empty()), ..dof.clone() };
-        if own.iter().any(|other| without_cone(other) != without_cone(dof)) {
+        let twists: Vec<(usize, [f64; 2])> = (0..own.len()).filter_map(|k| Some((k, own[k].twist_limits?))).collect();
+        let spherical = *kind == Joint::Spherical;
+        let free = |dof: &DofSettings| match spherical {
+            true => DofSettings { limits: None, twist_limits: None, ..dof.clone() },
+            false => dof.clone(),
+        };
+        let alike = own.iter().all(|other| free(other) == free(dof));
+        if !alike && !spherical {
             self.fault(format!("link \"{name}\": different damping or friction of one joint's degrees of freedom"));
         }
-        if cones.len() > 1 {
-            self.fault(format!("link \"{name}\": cones about several axes of one joint"));
+        let axes: BTreeSet<usize> = cones.iter().map(|(k, _)| *k).chain(twists.iter().map(|(k, _)| *k)).collect();
+        if axes.len() > 1 {
+            self.fault(format!("link \"{name}\": cones or limits of the twist about several axes of one joint"));
         }
         match kind {
             Joint::Fixed | Joint::Floating => {}
@@ -119,11 +127,15 @@ impl Writer<'_> {
                 t.extend(rotation(&state[*q..q + 4]));
                 t.put("angular_velocity_rad_per_s", rates);
                 t.put_unless(0.0, "armature_kg_m2", *armature);
-                for (axis, cone) in cones {
+                for axis in axes {
                     t.put("axis", [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }));
-                    t.put("cone_rad", cone);
                 }
-                t.extend(resistance(dof));
+                cones.iter().for_each(|(_, cone)| t.put("cone_rad", *cone));
+                twists.iter().for_each(|(_, limits)| t.put("twist_limits_rad", *limits));
+                match alike {
+                    true => t.extend(dof_settings(&free(dof), true)),
+                    false => t.put("dof", own.iter().map(|dof| dof_settings(&free(dof), true)).collect::<Vec<Table>>()),
+                }
             }
         }
         t.extend(self.mounts(body, k));
@@ -179,6 +191,7 @@ impl Writer<'_> {
                 mask,
                 name: _,
                 shape_materials: _,
+                shape_filters: _,
                 one_way,
                 sensor,
             } = collider;
@@ -279,7 +292,8 @@ fn resistance(dof: &DofSettings) -> Table {
 
 /// Returns the settings of a degree of freedom with a position; `turns` for an angle.
 pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
-    let DofSettings { limits, damping, friction, spring, drive, max_velocity, effort } = dof;
+    // the limits of a twist stand beside the axis of their joint
+    let DofSettings { limits, twist_limits: _, damping, friction, spring, drive, max_velocity, effort } = dof;
     let [at_limits, resists, dry, stiff, at_rest] = match turns {
         true => ["limits_rad", "damping_n_m_s_per_rad", "friction_n_m", "stiffness_n_m_per_rad", "rest_rad"],
         false => ["limits_m", "damping_n_s_per_m", "friction_n", "stiffness_n_per_m", "rest_m"],

@@ -1,7 +1,7 @@
 //! `[[body]]` of a rigid body as it stands.
 
 use tumble_core::collide::{ContactMode, Mat3, Pose, Shape, Vec3};
-use tumble_core::{Collidable, Material, Mode, Object, ObjectId, RigidBody, Visual, VisualGeometry};
+use tumble_core::{Collidable, CollisionGroup, Material, Mode, Object, ObjectId, RigidBody, Visual, VisualGeometry};
 
 use super::Writer;
 use super::shapes::is_same;
@@ -60,6 +60,17 @@ impl Writer<'_> {
         let mut tables = self.surfaces_of_parts(shape.part_count(), &body.material(part), body.shape_materials(part));
         for (n, t) in tables.iter_mut().enumerate() {
             body.shape_name(part, n).iter().for_each(|name| t.put("name", *name));
+        }
+        for (n, own) in body.shape_filters(part) {
+            let t = &mut tables[*n];
+            t.put("group", own.group.bit().trailing_zeros());
+            let same = (0..64)
+                .filter_map(CollisionGroup::new)
+                .all(|group| body.collides_with(part, group) == (own.mask & group.bit() != 0));
+            if !same {
+                t.put("mask", (0..64).filter(|group| own.mask & (1 << group) != 0).collect::<Vec<u32>>());
+            }
+            t.put_unless(body.is_sensor(part), "sensor", own.sensor);
         }
         let whole = tables.first().cloned().filter(|_| !matches!(shape, Shape::Compound(_)));
         let mut t = self.meshes.shape_of_parts(shape, &|n| tables.get(n).cloned().unwrap_or_default());

@@ -44,12 +44,6 @@ impl Writer<'_> {
             return self.fault(format!("\"{name}\", an event of an object that was removed"));
         };
         t.put("when", when);
-        let of_a_joint = |body: &ObjectId| self.world.get::<ArticulatedBody>(*body).is_none();
-        let beyond = |action: &Action| matches!(action, Action::Drive { body, dof: 1.., .. } if of_a_joint(body));
-        if event.actions().iter().any(beyond) {
-            let what = "an event that drives another degree of freedom of a loop joint than the first one";
-            return self.fault(format!("\"{name}\", {what}"));
-        }
         let deeds: Option<Vec<Table>> = event.actions().iter().map(|action| self.action(action)).collect();
         match deeds {
             Some(deeds) => t.put("do", deeds),
@@ -158,11 +152,12 @@ impl Writer<'_> {
                 t
             }
             Action::Drive { body, dof, target, .. } => {
-                let drive = match self.world.get::<ArticulatedBody>(*body) {
-                    Some(_) => self.dof_name(*body, *dof)?,
-                    None => name(body)?,
+                let (drive, k) = match self.world.get::<ArticulatedBody>(*body) {
+                    Some(_) => self.link_of_dof(*body, *dof)?,
+                    None => (name(body)?, *dof),
                 };
                 let mut t = Table::of("drive", drive);
+                t.put_unless(0, "dof", k as u32);
                 t.put("target", *target);
                 t
             }
@@ -180,6 +175,13 @@ impl Writer<'_> {
                 t
             }
         })
+    }
+
+    /// Returns `OBJECT/LINK` of the link that a degree of freedom moves, and its number among those of the link's joint.
+    fn link_of_dof(&self, id: ObjectId, dof: usize) -> Option<(String, usize)> {
+        let body = self.world.get::<ArticulatedBody>(id)?;
+        let link = body.model().links().iter().find(|link| (link.v..link.v + link.joint.dof()).contains(&dof))?;
+        Some((format!("{}/{}", self.world.name(id)?, link.name), dof - link.v))
     }
 
     /// Returns `OBJECT/LINK` of the link that a degree of freedom moves.

@@ -174,7 +174,11 @@ impl Writer<'_> {
         };
         let name = self.world.name(id)?.to_owned();
         match (part, self.world.get::<ArticulatedBody>(id)) {
-            (Some(part), Some(body)) => link_name(body, part).map(|(link, _)| format!("{name}/{link}")),
+            // the link to which the shape was added, which may be a fixed one
+            (Some(part), Some(body)) => {
+                let frame = body.frame_of(part).and_then(|frame| body.model().frames().get(frame));
+                frame.map(|frame| format!("{name}/{}", frame.name))
+            }
             _ => Some(name),
         }
     }

@@ -1,6 +1,7 @@
 //! Tests of `tumble-scene`.
 
 mod articulated;
+mod articulated_settings;
 mod articulated_world;
 mod bad_input;
 mod behaviors;

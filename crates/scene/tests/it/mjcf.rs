@@ -218,7 +218,7 @@ fn what_is_left_out_is_noted_with_file_line_and_element() {
     let has = |text: &str| assert!(notes.iter().any(|note| note.starts_with(text)), "{text}: {notes:#?}");
     has("m.xml:2: <visual>: <visual> is left out");
     has("m.xml:4: geom \"g\" and 1 more: soft contacts");
-    has("m.xml:6: joint \"j\": limits of ball joints are left out");
+    has("m.xml:6: joint \"j\": the limit of a ball joint's rotation becomes one of its swing, and one of its twist");
     has("m.xml:9: the muscle of <actuator>: <muscle> actuators are left out");
     has("m.xml:10: the jointpos of <sensor>: couplings, actuators and sensors of ball and free joints are left out");
     assert_eq!(notes.len(), 5, "{notes:#?}");

@@ -285,7 +285,16 @@ fn add_crane(world: &mut World, mesh: Shape) {
     for (dof, drive) in drives.into_iter().enumerate() {
         let spring = Some(Spring { stiffness: 3.0, rest: 0.1 });
         let (limits, max_velocity, effort) = (Some([-1.0, 2.0]), 7.5, 40.0);
-        let settings = DofSettings { limits, damping: 0.2, friction: 0.1, spring, drive, max_velocity, effort };
+        let settings = DofSettings {
+            limits,
+            damping: 0.2,
+            friction: 0.1,
+            spring,
+            drive,
+            max_velocity,
+            effort,
+            ..Default::default()
+        };
         crane.set_dof(dof, settings).unwrap();
     }
     for dof in 2..5 {

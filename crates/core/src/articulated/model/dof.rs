@@ -15,8 +15,13 @@
 //! so no gain is too stiff for the step. `backtracking` does the same, with forces that hold over
 //! the sub-step, if any soft row changes its velocity by more than half of it. Otherwise the rows are
 //! those of the middle of the sub-step with `verlet` (implicit midpoint rule), and with the other
-//! integrators damping and position drives are forces, as accurate as the integrator. Springs are
-//! forces in both steppers.
+//! integrators damping and position drives are forces, as accurate as the integrator. Springs of
+//! joints with one degree of freedom are forces in both steppers; those of spherical joints are rows wherever drives are,
+//! by the implicit midpoint rule of loop joints.
+//!
+//! Settings of degree of freedom `k` of a spherical joint act about axis `k` of the link. Rest positions and targets of the
+//! three are the components of one rotation vector `g` in the joint's frame, and the positions are `q = g + log(G⁻¹·R)` with
+//! `G = exp(g)`: drive and spring pull about the axis of the rotation that is left, if their gains are equal.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -26,15 +31,22 @@
 //! | `q̇_max` | [`DofSettings::max_velocity`]: a stop that takes whatever force it needs, like a limit |
 
 use crate::articulated::model::playback::Playback;
+use crate::constraint::loop_joint::WIDE;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Settings of one degree of freedom. Spherical and floating joints support only damping, dry friction
-/// and velocity limits, and spherical ones cones: their degrees of freedom have no single position.
+/// Settings of one degree of freedom. Floating joints support only damping, dry friction and velocity limits. Degree of freedom
+/// `k` of a spherical joint is the rotation about axis `k` of the link; its rest position and target are component `k` of a
+/// rotation vector in the joint's frame, x, y or z.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DofSettings {
     /// Lower and upper limit of the position, rad or m. Those of degree of freedom `k` of a spherical joint are 0 and the
     /// half angle of a cone about axis `k` of the joint's frame, x, y or z, in which the same axis of the link stays.
     pub limits: Option<[f64; 2]>,
+    /// Lower and upper limit, rad, within 2π of 0, of the turn about axis `k` of a spherical joint of an articulated body: that of
+    /// the link about the axis, after the shortest turn of the joint's axis to it. `None` for all other joints; a loop joint
+    /// has [its own](crate::LoopJoint::set_twist_limits).
+    pub twist_limits: Option<[f64; 2]>,
     /// Viscous damping, N·m·s/rad or N·s/m, at least 0.
     pub damping: f64,
     /// Dry friction: maximum torque or force that resists motion, N·m or N, at least 0.
@@ -55,6 +67,7 @@ impl Default for DofSettings {
     fn default() -> DofSettings {
         DofSettings {
             limits: None,
+            twist_limits: None,
             damping: 0.0,
             friction: 0.0,
             spring: None,
@@ -65,8 +78,9 @@ impl Default for DofSettings {
     }
 }
 
-/// A linear spring on a joint. It is an explicit force: keep `stiffness·dt²` below the inertia that
-/// it moves, or use [`Drive::Position`].
+/// A linear spring on a joint. On a joint with one degree of freedom of an articulated body it is an explicit force: keep
+/// `stiffness·dt²` below the inertia that it moves, or use [`Drive::Position`]. Those of spherical joints and of loop joints are
+/// implicit.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
     /// Stiffness, N·m/rad or N/m, at least 0.
@@ -134,7 +148,8 @@ impl DofSettings {
             let lower = (lo != 0.0).then_some(("the lower limit of the cone", lo, "0: a cone has no lower limit"));
             lower.or((cone.is_nan() || cone < 0.0).then_some(("the cone", cone, "at least 0 rad")))
         });
-        below.or(DofSettings { limits: None, ..self.clone() }.range_error(false))
+        let twist = self.twist_limits.and_then(twist_fault);
+        below.or(twist).or(DofSettings { limits: None, twist_limits: None, ..self.clone() }.range_error(true))
     }
 
     /// Returns the first setting out of its range: name, value, admissible range.
@@ -145,11 +160,18 @@ impl DofSettings {
         let limit = |value: f64| {
             (value.is_nan() || value < 0.0).then_some(("the drive's limit", value, "at least 0; infinite for none"))
         };
+        if let Some([lo, _]) = self.twist_limits {
+            return Some((
+                "the lower limit of the twist",
+                lo,
+                "absent: spherical joints of articulated bodies have one",
+            ));
+        }
         if !positional && (self.limits.is_some() || self.spring.is_some() || self.drive != Drive::None) {
             return Some((
                 "the number of degrees of freedom of its joint with limits, springs or drives",
                 1.0,
-                "0: only revolute and prismatic joints have them, and spherical ones a cone",
+                "0: only revolute, prismatic and spherical joints have them",
             ));
         }
         let [lo, hi] = self.limits.unwrap_or([-1.0, 1.0]);
@@ -199,4 +221,13 @@ impl DofSettings {
         };
         drive - self.damping * v
     }
+}
+
+/// Returns what is wrong with the limits of a twist, rad: name, value, admissible range.
+pub(crate) fn twist_fault([lo, hi]: [f64; 2]) -> Option<(&'static str, f64, &'static str)> {
+    let far = lo.abs().max(hi.abs());
+    let wrong = |what, value: f64, fine: bool, expected| (!fine).then_some((what, value, expected));
+    wrong("the lower limit of the twist", lo, lo <= hi, "a number that is not above the upper limit")
+        .or(wrong("the range of the twist", hi - lo, hi - lo <= WIDE, "at most 3π/2"))
+        .or(wrong("a limit of the twist", far, far <= TAU, "within 2π of 0"))
 }

@@ -84,6 +84,7 @@ pub use error::LoopJointError;
 pub use force::JointForce;
 pub use kind::LoopJointKind;
 pub use transmission::Transmission;
+pub(crate) use turns::WIDE;
 
 use crate::articulated::{DofSettings, Drive};
 use crate::constraint::builder::RowBuilder;
@@ -349,10 +350,11 @@ impl LoopJoint {
         });
         let (sprung, driven) = (self.sprung(pair, &coordinates), self.driven(pair, &coordinates));
         for (k, (coordinate, dof)) in coordinates.iter().zip(&self.dofs).enumerate() {
-            let state = DofState { q: driven[k], v: coordinate.rate, settings: &dof.settings };
+            let (settings, limits) = (&dof.settings, dof.settings.limits);
+            let state = DofState { q: driven[k], v: coordinate.rate, settings, limits };
             state.velocity_limits().for_each(|(sign, target)| row(coordinate.row(sign, target)));
             state.resistance(level, |target| row(coordinate.row(1.0, target)));
-            if let Some(target) = spring_row(&dof.settings, sprung[k], coordinate.rate, level) {
+            if let Some(target) = state.spring(level, sprung[k]) {
                 row(coordinate.row(1.0, target));
             }
             if let Some(target) = state.drive(level, time) {
@@ -398,17 +400,8 @@ impl LoopJoint {
     }
 }
 
-/// Returns the row of a spring at a position and a rate, if it is a row.
-fn spring_row(settings: &DofSettings, position: f64, rate: f64, level: Level) -> Option<RowTarget> {
-    let (spring, soft) = (settings.spring.filter(|s| s.stiffness > 0.0)?, level.soft_step()?);
-    let h = level.h();
-    let velocity = rate - 4.0 * (position - spring.rest) * soft / (h * h);
-    let compliance = 4.0 / (spring.stiffness * h * h);
-    Some(RowTarget { velocity, compliance, share: level.share(), ..RowTarget::new(RowSet::Equality, 0.0) })
-}
-
 /// Returns an angle plus the number of turns that takes it within π of `middle`.
-fn near(angle: f64, middle: f64) -> f64 {
+pub(crate) fn near(angle: f64, middle: f64) -> f64 {
     let turns = ((middle - angle + PI) / TAU).floor();
     angle + TAU * turns
 }

@@ -3,6 +3,7 @@
 use super::turns::WIDE;
 use super::{LoopJoint, LoopJointError, LoopJointKind, Transmission};
 use crate::articulated::DofSettings;
+use crate::articulated::twist_fault;
 use std::f64::consts::TAU;
 
 impl LoopJoint {
@@ -56,7 +57,7 @@ impl LoopJoint {
 
     /// Sets the settings of degree of freedom `k` in the order of [`LoopJointKind::dofs`]. Those of an angle are about an angle in
     /// (−π, π] without limits, and within π of the middle of its limits with them. A revolute joint with limits more than
-    /// 3π/2 apart follows its angle from frame to frame instead, so it does not
+    /// 3π/2 apart, or with a limit on one side (the other infinite), follows its angle from frame to frame instead, so it does not
     /// pass its stops. A joint of a world gets other limits by [`World::change_joint`](crate::World::change_joint). A spherical
     /// joint has [cones](Self::set_cone) and [limits of its twist](Self::set_twist_limits) instead of limits; targets and rest positions of its three
     /// degrees of freedom are the components of a rotation vector. A velocity drive of it that may meet them needs a largest torque.
@@ -98,7 +99,10 @@ impl LoopJoint {
         }
         let span = dof.limits.map_or(0.0, |[lo, hi]| hi - lo);
         let expected = match self.kind {
-            LoopJointKind::Revolute if span > TAU => "at most 2π: its angle has no count of turns",
+            LoopJointKind::Revolute if span.is_finite() && span > TAU => {
+                "at most 2π, or infinite on one side: between two limits its angle has no count of turns"
+            }
+            LoopJointKind::Revolute => return Ok(()),
             kind if kind != LoopJointKind::Revolute && kind.turns_at(k) && span > WIDE => {
                 "at most 3π/2: only a revolute joint follows its angle"
             }
@@ -165,11 +169,8 @@ impl LoopJoint {
         if self.kind != LoopJointKind::Spherical && limits.is_some() {
             return Err(self.wrong_kind("twist"));
         }
-        if let Some([lo, hi]) = limits {
-            self.check("the lower limit of the twist", lo, lo <= hi, "a number that is not above the upper limit")?;
-            self.check("the range of its twist", hi - lo, hi - lo <= WIDE, "at most 3π/2")?;
-            let far = lo.abs().max(hi.abs());
-            self.check("a limit of the twist", far, far <= TAU, "within 2π of 0")?;
+        if let Some((what, value, expected)) = limits.and_then(twist_fault) {
+            return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
         }
         self.twist_limits = limits;
         Ok(())

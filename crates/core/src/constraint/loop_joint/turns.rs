@@ -4,6 +4,8 @@
 //! while the joint passes a stop by less than half of what the limits leave of a turn. A free motion of half a step passes it by
 //! `½·h·θ̇`, so limits near ±π need a memory: the angle at the end of the last frame, which is a number of the state.
 //!
+//! A limit on one side leaves any number of turns on the other, which the same number counts.
+//!
 //! ```text
 //! θ = θ_raw + 2π·k   with   |θ − θ_frame| ≤ π
 //! ```
@@ -21,12 +23,13 @@ use crate::world::view::{ObjectId, WorldView};
 use std::f64::consts::TAU;
 
 /// Distance of two limits above which the angle is followed, rad.
-pub(super) const WIDE: f64 = 0.75 * TAU;
+pub(crate) const WIDE: f64 = 0.75 * TAU;
 
 impl LoopJoint {
     /// Returns whether its angle is a number of the state.
     pub(crate) fn counts_turns(&self) -> bool {
-        self.kind == LoopJointKind::Revolute && self.dofs[0].settings.limits.is_some_and(|[lo, hi]| hi - lo > WIDE)
+        let followed = |[lo, hi]: [f64; 2]| hi - lo > WIDE && (lo.is_finite() || hi.is_finite());
+        self.kind == LoopJointKind::Revolute && self.dofs[0].settings.limits.is_some_and(followed)
     }
 
     /// Sets which object of a world it is.
@@ -40,9 +43,13 @@ impl LoopJoint {
         self.position(view).map_or(middle, |[angle, _]| near(angle, middle))
     }
 
-    /// Returns the middle of the limits of degree of freedom `k`; 0 without limits.
+    /// Returns the middle of the limits of degree of freedom `k`; 0 without limits, and the angle nearest to 0 that a limit on one
+    /// side leaves.
     pub(super) fn middle_of_limits(&self, k: usize) -> f64 {
-        self.dofs[k].settings.limits.map_or(0.0, |[lo, hi]| 0.5 * (lo + hi))
+        let middle = |[lo, hi]: [f64; 2]| {
+            if lo.is_finite() && hi.is_finite() { 0.5 * (lo + hi) } else { 0.0f64.max(lo).min(hi) }
+        };
+        self.dofs[k].settings.limits.map_or(0.0, middle)
     }
 
     /// Returns the angle within π of which that of a revolute joint is.

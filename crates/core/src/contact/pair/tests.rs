@@ -70,6 +70,7 @@ fn separated_pairs_do_not_touch_during_the_step() {
                 parts: MovingPair {
                     mode: ContactMode::Surface,
                     tests: OwnTests::NONE,
+                    filtered: None,
                     shapes: pair,
                     part_states: [&part_states[0], &part_states[1]],
                     skipped: &[],
@@ -97,6 +98,7 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
         parts: MovingPair {
             mode: ContactMode::Surface,
             tests: OwnTests::NONE,
+            filtered: None,
             shapes: [&cylinder, &block],
             part_states: [&part_states[0], &part_states[1]],
             skipped: &[],

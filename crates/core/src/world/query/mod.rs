@@ -10,8 +10,10 @@ pub use rays::{Ray, RayCastHit};
 pub use shapes::{BodyDistance, PointDepth, ShapeCastHit, ShapeOverlap};
 
 use super::{Core, World};
+use crate::object::FilteredPart;
 use crate::object::collidable::CollisionGroup;
 use crate::world::view::{Entry, ObjectId};
+use std::borrow::Cow;
 use tumble_collide::{ContactMode, Pose, Shape};
 
 /// Selects the parts that a query finds. Like a part of a body, a query has a group and a mask: a
@@ -37,11 +39,23 @@ pub struct QueryFilter {
     pub mask: u64,
     /// Objects that it does not find; none by default.
     pub ignored: Vec<ObjectId>,
+    /// Parts that it does not find, such as [those of a link](crate::ArticulatedBody::parts_of_link); none by default.
+    pub ignored_parts: Vec<(ObjectId, usize)>,
+    /// The object, and the parts of it, as which the query acts: it then finds only parts that could have contacts with it. Groups and
+    /// masks of both, [ignored pairs](crate::PairMaterial::collides) and excluded links count as for contacts, whether or not anything
+    /// moves; `None` stands for all parts of the object. Group and mask of the filter count too. None by default.
+    pub acting_as: Option<(ObjectId, Option<Vec<usize>>)>,
 }
 
 impl Default for QueryFilter {
     fn default() -> QueryFilter {
-        QueryFilter { group: CollisionGroup::default(), mask: u64::MAX, ignored: Vec::new() }
+        QueryFilter {
+            group: CollisionGroup::default(),
+            mask: u64::MAX,
+            ignored: Vec::new(),
+            ignored_parts: Vec::new(),
+            acting_as: None,
+        }
     }
 }
 
@@ -52,17 +66,46 @@ impl QueryFilter {
         self.ignored.push(id);
         self
     }
+
+    /// Returns the filter with more ignored parts of an object.
+    #[must_use]
+    pub fn ignoring_parts(mut self, id: ObjectId, parts: impl IntoIterator<Item = usize>) -> QueryFilter {
+        self.ignored_parts.extend(parts.into_iter().map(|part| (id, part)));
+        self
+    }
+
+    /// Returns the filter that finds what could have contacts with an object.
+    #[must_use]
+    pub fn acting_as(mut self, id: ObjectId) -> QueryFilter {
+        self.acting_as = Some((id, None));
+        self
+    }
+
+    /// Returns the filter that finds what could have contacts with one of some parts of an object.
+    #[must_use]
+    pub fn acting_as_parts(mut self, id: ObjectId, parts: impl IntoIterator<Item = usize>) -> QueryFilter {
+        self.acting_as = Some((id, Some(parts.into_iter().collect())));
+        self
+    }
 }
 
 /// A part with a shape.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Part<'w> {
     entry: Entry<'w>,
     id: ObjectId,
     part: usize,
-    shape: &'w Shape,
+    shape: Cow<'w, Shape>,
     mode: ContactMode,
     pose: Pose,
+}
+
+impl<'w> Part<'w> {
+    /// Returns the part with those of its shapes that are no sensors, if there are any.
+    fn solid(self) -> Option<Part<'w>> {
+        let shape = FilteredPart::of(self.entry.object.collidable()?, self.part)?.solid()?;
+        Some(Part { shape, ..self })
+    }
 }
 
 impl Core {
@@ -73,7 +116,8 @@ impl Core {
             let id = self.table.order[entry.place];
             entry.state_range.parts.clone().enumerate().filter_map(move |(part, part_state)| {
                 let pose = self.derived.part_states[part_state].pose;
-                Some(Part { entry, id, part, shape: body.shape(part)?, mode: body.contact_mode(part), pose })
+                let shape = Cow::Borrowed(body.shape(part)?);
+                Some(Part { entry, id, part, shape, mode: body.contact_mode(part), pose })
             })
         })
     }
@@ -87,13 +131,40 @@ impl World {
 
     /// Returns the parts that a filter selects, in the order of the part table.
     fn parts_by(&self, filter: &QueryFilter) -> impl Iterator<Item = Part<'_>> {
-        self.parts().filter(|part| {
-            part.entry.object.collidable().is_some_and(|body| {
-                !body.is_sensor(part.part)
-                    && filter.mask & body.collision_group(part.part).bit() != 0
-                    && body.collides_with(part.part, filter.group)
-                    && !filter.ignored.contains(&part.id)
-            })
+        let found = self
+            .parts()
+            .filter(|part| !filter.ignored.contains(&part.id) && !filter.ignored_parts.contains(&(part.id, part.part)));
+        let actors = self.actors(filter);
+        found.filter_map(move |part| {
+            let own = FilteredPart::of(part.entry.object.collidable()?, part.part)?;
+            let shape = match &actors {
+                None => own.meeting(filter.group, filter.mask)?,
+                Some(actors) => {
+                    let surface = (part.id, part.part, own.body.material(part.part));
+                    let meet = actors.iter().filter(|(id, actor)| {
+                        let apart = *id != part.id || own.body.parts_collide(actor.part, part.part);
+                        let actor = (*id, actor.part, actor.body.material(actor.part));
+                        apart && !self.core.pair_materials.ignores(actor, surface)
+                    });
+                    let meet: Vec<FilteredPart<'_>> = meet.map(|(_, actor)| *actor).collect();
+                    own.met_by(&meet, filter.group, filter.mask)?
+                }
+            };
+            Some(Part { shape, ..part })
         })
+    }
+
+    /// Returns the parts as which a query acts, if it acts as any.
+    fn actors(&self, filter: &QueryFilter) -> Option<Vec<(ObjectId, FilteredPart<'_>)>> {
+        let (id, parts_of) = filter.acting_as.as_ref()?;
+        let id = *id;
+        let body = self.object(id).and_then(|object| object.collidable());
+        let parts = body.into_iter().flat_map(|body| (0..body.parts()).filter_map(|k| FilteredPart::of(body, k)));
+        Some(
+            parts
+                .filter(|own| parts_of.as_ref().is_none_or(|parts| parts.contains(&own.part)))
+                .map(|own| (id, own))
+                .collect(),
+        )
     }
 }

@@ -3,6 +3,7 @@
 use super::Part;
 use crate::contact::detect::may_collide;
 use crate::contact::own_tests::OwnTests;
+use crate::object::FilteredPart;
 use crate::world::World;
 use crate::world::view::{Mode, ObjectId};
 use std::collections::BTreeMap;
@@ -56,7 +57,11 @@ impl World {
         let mode = a.mode.of_pair(b.mode);
         let mut found: Vec<Contact> = Vec::new();
         let tests = OwnTests::of([(a.entry.object, a.part), (b.entry.object, b.part)]);
-        tests.contacts(mode, [a.shape, b.shape], [&a.pose, &b.pose], 0.0, &mut found);
+        let bodies = (a.entry.object.collidable()?, b.entry.object.collidable()?);
+        let (side_a, side_b) = (FilteredPart::of(bodies.0, a.part)?, FilteredPart::of(bodies.1, b.part)?);
+        for [shape_a, shape_b] in side_a.contact_pairs(&side_b) {
+            tests.contacts(mode, [&shape_a, &shape_b], [&a.pose, &b.pose], 0.0, &mut found);
+        }
         found.iter().map(|contact| -contact.gap).max_by(f64::total_cmp)
     }
 }

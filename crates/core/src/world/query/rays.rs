@@ -71,7 +71,7 @@ impl World {
 impl Core {
     /// Returns the first parts that rays enter, without those that `skip` selects.
     pub(crate) fn parts_along(&self, rays: &[Ray], skip: impl Fn(ObjectId, usize) -> bool) -> Vec<Option<RayCastHit>> {
-        self.cast(&Targets::new(self.parts().filter(solid_unless(skip)), rays.len() > FEW), rays)
+        self.cast(&Targets::new(self.parts().filter_map(solid_unless(skip)), rays.len() > FEW), rays)
     }
 
     fn cast(&self, targets: &Targets<'_>, rays: &[Ray]) -> Vec<Option<RayCastHit>> {
@@ -92,26 +92,25 @@ impl Core {
 
     /// Returns the distance to the first part that a ray enters, without those that `skip` selects.
     pub(crate) fn distance_along(&self, ray: &Ray, skip: impl Fn(ObjectId, usize) -> bool) -> Option<f64> {
-        let seen = self.parts().filter(solid_unless(skip));
+        let seen = self.parts().filter_map(solid_unless(skip));
         let targets = Targets { unbounded: seen.collect(), bounded: Vec::new(), tree: None };
         targets.first(ray).map(|hit| hit.distance)
     }
 }
 
-/// Returns whether a part stops rays of sensors: no trigger, and not one that `skip` selects.
-fn solid_unless(skip: impl Fn(ObjectId, usize) -> bool) -> impl Fn(&Part<'_>) -> bool {
-    move |part| {
-        part.entry.object.collidable().is_some_and(|body| !body.is_sensor(part.part)) && !skip(part.id, part.part)
-    }
+/// Returns a part, with its shapes that are no triggers, if it stops rays of sensors and `skip` does not select it.
+fn solid_unless<'w>(skip: impl Fn(ObjectId, usize) -> bool) -> impl Fn(Part<'w>) -> Option<Part<'w>> {
+    move |part| if skip(part.id, part.part) { None } else { part.solid() }
 }
 
 impl<'w> Targets<'w> {
     fn new(parts: impl Iterator<Item = Part<'w>>, with_tree: bool) -> Targets<'w> {
-        let (unbounded, mut bounded): (Vec<_>, Vec<_>) = parts.partition(|part| matches!(part.shape, Shape::HalfSpace));
+        let (unbounded, mut bounded): (Vec<_>, Vec<_>) =
+            parts.partition(|part| matches!(*part.shape, Shape::HalfSpace));
         let tree = with_tree.then(|| {
             let boxes: Vec<Aabb> = bounded.iter().map(|part| part.shape.tight_aabb(&part.pose)).collect();
             let tree = BoxTree::new(&boxes);
-            bounded = tree.order().iter().map(|&k| bounded[k as usize]).collect();
+            bounded = tree.order().iter().map(|&k| bounded[k as usize].clone()).collect();
             tree
         });
         Targets { unbounded, bounded, tree }

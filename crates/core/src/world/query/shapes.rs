@@ -84,7 +84,7 @@ impl World {
                 return None;
             }
             found.clear();
-            contacts_in_mode(part.mode, shape, pose, part.shape, &part.pose, 0.0, &mut found);
+            contacts_in_mode(part.mode, shape, pose, &part.shape, &part.pose, 0.0, &mut found);
             let deepest = found.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).filter(|deepest| deepest.gap < 0.0)?;
             let shape = deepest.shapes[1] as usize;
             Some(ShapeOverlap { id: part.id, part: part.part, shape, depth: -deepest.gap })
@@ -104,7 +104,7 @@ impl World {
         let others: Vec<Part<'_>> = self.parts().filter(|part| part.id == b).collect();
         let mut best: Option<BodyDistance> = None;
         for part in self.parts().filter(|part| part.id == a) {
-            nearest(Some((a, part.part)), part.shape, &part.pose, others.iter().copied(), &mut best);
+            nearest(Some((a, part.part)), &part.shape, &part.pose, others.iter().cloned(), &mut best);
         }
         Ok(best)
     }
@@ -188,12 +188,12 @@ impl World {
 /// the direction. A step that went too far by the error of a distance is halved.
 fn cast(shape: &Shape, pose: &Pose, direction: &Vec3, max: f64, part: &Part<'_>) -> Option<ShapeCastHit> {
     let convex = |shape: &Shape| shape.has_convex_parts() && !matches!(shape, Shape::Compound(_));
-    let plane = matches!(shape, Shape::HalfSpace) || matches!(part.shape, Shape::HalfSpace);
-    let by_normal = plane || convex(shape) && convex(part.shape);
+    let plane = matches!(shape, Shape::HalfSpace) || matches!(&*part.shape, Shape::HalfSpace);
+    let by_normal = plane || convex(shape) && convex(&part.shape);
     let met = MET * shape.bounding_radius().min(part.shape.bounding_radius()).min(1e9);
     let (mut clear, mut distance) = (0.0, 0.0);
     for advance in 1.. {
-        let pair = closest_points(shape, &moved(pose, &(direction * distance)), part.shape, &part.pose)?;
+        let pair = closest_points(shape, &moved(pose, &(direction * distance)), &part.shape, &part.pose)?;
         if pair.distance < -met && distance - clear > met {
             distance = 0.5 * (clear + distance);
             continue;
@@ -232,7 +232,7 @@ fn nearest<'w>(
         if least > 0.0 && best.is_some_and(|best| least > best.distance) {
             continue;
         }
-        let Some(pair) = closest_points(shape, pose, part.shape, &part.pose) else { continue };
+        let Some(pair) = closest_points(shape, pose, &part.shape, &part.pose) else { continue };
         if best.is_none_or(|best| pair.distance < best.distance) {
             let b = (part.id, part.part);
             let (shapes, distance) = (pair.shapes.map(|shape| shape as usize), pair.distance);

@@ -6,6 +6,7 @@ use super::template::MAX_SPAWNED;
 use super::trigger::{MAX_KEY_BYTES, Trigger};
 use super::{ScriptedEvent, Template};
 use crate::constraint::loop_joint::LoopJoint;
+use crate::object::has_sensor;
 use crate::rigid::RigidBody;
 use crate::world::World;
 use crate::world::view::{Mode, ObjectId};
@@ -176,7 +177,7 @@ fn check_trigger(trigger: &Trigger, world: &World) -> Result<(), EventError> {
         Trigger::Touching { a, b } | Trigger::Parting { a, b } => bodies(a).and_then(|()| bodies(b)),
         Trigger::Enters { sensor, bodies: list } | Trigger::Leaves { sensor, bodies: list } => {
             let object = world.object(*sensor).ok_or(EventError::Gone("the sensor of an event"))?;
-            if !object.collidable().is_some_and(|parts| (0..parts.parts()).any(|part| parts.is_sensor(part))) {
+            if !object.collidable().is_some_and(has_sensor) {
                 return Err(kind(world, *sensor, "a sensor"));
             }
             bodies(list)

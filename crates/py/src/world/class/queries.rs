@@ -84,9 +84,10 @@ impl World {
     ///
     /// A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
     /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies (a handle, a name or a
-    /// list of them). Sensors are not found. Runs on ``threads`` threads, which change no bit.
-    #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None))]
+    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+    /// name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
+    /// with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
+    #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn cast_rays<'py>(
         &self,
@@ -97,8 +98,16 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
-        query::cast_rays(&self.shared, py, origins, directions, max_distance, &Selection { group, mask, ignore })
+        query::cast_rays(
+            &self.shared,
+            py,
+            origins,
+            directions,
+            max_distance,
+            &Selection { group, mask, ignore, as_body },
+        )
     }
 
     /// Returns the first body that a shape touches if it moves along a direction without rotation, or
@@ -108,7 +117,7 @@ impl World {
     /// finite. position, orientation: where it starts. Fields: ``distance``, m, 0 if it overlaps at
     /// the start; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), m;
     /// ``normal`` (3,), unit, from the body towards the shape.
-    #[pyo3(signature = (shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None))]
+    #[pyo3(signature = (shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn cast_shape<'py>(
         &self,
@@ -121,16 +130,17 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
-        let (at, selection) = ((position, orientation), Selection { group, mask, ignore });
+        let (at, selection) = ((position, orientation), Selection { group, mask, ignore, as_body });
         query::cast_shape(&self.shared, py, &shape, direction, max_distance, at, &selection)
     }
 
     /// Returns the bodies that overlap a shape at a pose: a structured array with the fields ``body``,
     /// ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
     ///
-    /// position, orientation: as in ``add_rigid``. group, mask, ignore: as in ``cast_rays``.
-    #[pyo3(signature = (shape, position=None, orientation=None, *, group=0, mask=None, ignore=None))]
+    /// position, orientation: as in ``add_rigid``. group, mask, ignore, as_body: as in ``cast_rays``.
+    #[pyo3(signature = (shape, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn overlaps<'py>(
         &self,
@@ -141,8 +151,9 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
-        query::overlaps(&self.shared, py, &shape, (position, orientation), &Selection { group, mask, ignore })
+        query::overlaps(&self.shared, py, &shape, (position, orientation), &Selection { group, mask, ignore, as_body })
     }
 
     /// Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
@@ -151,8 +162,8 @@ impl World {
     /// a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
     /// negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
     /// for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
-    /// the first. group, mask, ignore: of a shape, as in ``cast_rays``.
-    #[pyo3(signature = (a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None))]
+    /// the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.
+    #[pyo3(signature = (a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None, as_body=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn closest_points<'py>(
         &self,
@@ -164,14 +175,22 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
-        query::closest_points(&self.shared, py, a, b, (position, orientation), &Selection { group, mask, ignore })
+        query::closest_points(
+            &self.shared,
+            py,
+            a,
+            b,
+            (position, orientation),
+            &Selection { group, mask, ignore, as_body },
+        )
     }
 
     /// Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
     ///
-    /// point: shape (3,), m. The surface belongs to a body. group, mask, ignore: as in ``cast_rays``.
-    #[pyo3(signature = (point, *, group=0, mask=None, ignore=None))]
+    /// point: shape (3,), m. The surface belongs to a body. group, mask, ignore, as_body: as in ``cast_rays``.
+    #[pyo3(signature = (point, *, group=0, mask=None, ignore=None, as_body=None))]
     fn contains<'py>(
         &self,
         py: Python<'py>,
@@ -179,8 +198,9 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyArray1<i64>>> {
-        query::contains(&self.shared, py, point, &Selection { group, mask, ignore })
+        query::contains(&self.shared, py, point, &Selection { group, mask, ignore, as_body })
     }
 
     /// Returns how deep points lie in the bodies: one row for a point of shape (3,), a structured
@@ -190,7 +210,7 @@ impl World {
     /// point outside of all bodies minus the distance from the nearest one, minus infinity if there
     /// is none; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
     /// point of the surface, m; ``normal`` (3,), unit, outward.
-    #[pyo3(signature = (points, *, group=0, mask=None, ignore=None))]
+    #[pyo3(signature = (points, *, group=0, mask=None, ignore=None, as_body=None))]
     fn point_depth<'py>(
         &self,
         py: Python<'py>,
@@ -198,8 +218,9 @@ impl World {
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
+        as_body: Option<&Bound<'_, PyAny>>,
     ) -> Result<Bound<'py, PyAny>> {
-        query::point_depth(&self.shared, py, points, &Selection { group, mask, ignore })
+        query::point_depth(&self.shared, py, points, &Selection { group, mask, ignore, as_body })
     }
 
     /// Returns the mechanical energy of everything that moves: ``kinetic``, ``potential`` (zero at

@@ -134,6 +134,11 @@ impl MjcfWriter<'_> {
                 Some((_, material)) => common.without(&["friction", "condim"]).joined(&self.friction(owner, material)),
                 None => common.clone(),
             };
+            let filter = parts.shape_filters(part).iter().find(|(shape, _)| *shape == n).filter(|_| collidable);
+            let surface = match filter {
+                Some((_, filter)) => self.filtered(owner, filter, &surface),
+                None => surface,
+            };
             let common = named(parts.shape_name(part, n), surface, &mut self.shapes);
             self.geoms(owner, &(pose * piece.pose), &piece.shape, &common);
         }

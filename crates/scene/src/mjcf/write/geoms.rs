@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use tumble_core::collide::{Pose, Shape, TriMesh, Vec3};
-use tumble_core::{Appearance, Collidable, CollisionGroup, Material, Visual, VisualGeometry, World};
+use tumble_core::{Appearance, Collidable, CollisionGroup, Material, ShapeFilter, Visual, VisualGeometry, World};
 
 use super::MjcfWriter;
 use super::xml::{Attributes, numbers, vector};
@@ -37,7 +37,10 @@ impl Groups {
         let mut kinds: BTreeSet<Kind> = BTreeSet::new();
         for parts in world.ids().iter().filter_map(|id| world.object(*id)?.collidable()) {
             let solid = (0..parts.parts()).filter(|part| parts.shape(*part).is_some());
-            kinds.extend(solid.map(|part| kind_of(parts, part)));
+            for part in solid {
+                kinds.insert(kind_of(parts, part));
+                kinds.extend(parts.shape_filters(part).iter().map(|(_, own)| (own.group.bit(), own.mask)));
+            }
         }
         let mut used: Vec<u64> = kinds.iter().map(|(group, _)| *group).collect();
         used.dedup();
@@ -165,6 +168,20 @@ impl MjcfWriter<'_> {
             Some(look) => t.joined(&self.color(owner, look)),
             None => t.with("group", HIDDEN),
         }
+    }
+
+    /// Returns the attributes of a part of a compound with a filter of its own, instead of those of the whole.
+    pub(super) fn filtered(&mut self, owner: &str, filter: &ShapeFilter, whole: &Attributes) -> Attributes {
+        let whole = whole.without(&["contype", "conaffinity"]);
+        if filter.sensor {
+            self.note(owner, "shapes that only report overlaps do not collide in MuJoCo, and report nothing");
+            return whole.with("contype", "0").with("conaffinity", "0");
+        }
+        let [kind, affinity] = self.groups.bits((filter.group.bit(), filter.mask));
+        let mut t = whole;
+        t.put_unless(1, "contype", kind, kind.to_string());
+        t.put_unless(1, "conaffinity", affinity, affinity.to_string());
+        t
     }
 
     pub(super) fn friction(&mut self, owner: &str, material: &Material) -> Attributes {

@@ -23,7 +23,6 @@ use tumble_core::{ArticulatedBody, Joint, Mode, Object, ObjectId};
 
 use super::MjcfWriter;
 use super::bodies::put_rotation;
-use super::geoms::{about_frame, visual_of};
 use super::joints::coupled;
 use super::xml::{Attributes, numbers, vector};
 
@@ -31,13 +30,13 @@ use super::xml::{Attributes, numbers, vector};
 const FAR: f64 = 1e10;
 
 /// An articulated body that is being written.
-struct Tree<'b> {
-    id: ObjectId,
+pub(super) struct Tree<'b> {
+    pub(super) id: ObjectId,
     name: &'b str,
-    body: &'b ArticulatedBody,
+    pub(super) body: &'b ArticulatedBody,
     state: &'b [f64],
     /// Whether the whole body collides.
-    collidable: bool,
+    pub(super) collidable: bool,
     children: Vec<Vec<usize>>,
     /// Names of its joints by link.
     joints: Vec<String>,
@@ -132,7 +131,11 @@ impl MjcfWriter<'_> {
             let below = chain[n + 1..].iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
             self.joint(tree, *joint, &below.inverse());
         }
-        self.inertial(&link.name, &link.mass);
+        // without the links that are fixed to it, which are bodies in this one
+        let own = tree.body.link_mass(&link.name).unwrap_or(link.mass);
+        if own != LinkMass::none() || link.mass == LinkMass::none() {
+            self.inertial(&link.name, &own);
+        }
         self.content(tree, Some(k));
         for child in &tree.children[k] {
             self.link(tree, *child, &[]);
@@ -148,14 +151,15 @@ impl MjcfWriter<'_> {
         let dofs = &tree.body.dofs()[link.v..link.v + link.joint.dof()];
         let Some(dof) = dofs.first() else { return };
         let spherical = link.joint == Joint::Spherical;
-        if spherical && dofs.iter().any(|other| other.limits.is_some()) {
-            self.note(&link.name, "cones of spherical joints are left out");
-        }
-        let free = |dof: &DofSettings| DofSettings { limits: dof.limits.filter(|_| !spherical), ..dof.clone() };
+        let range = if spherical { self.ball_range(&link.name, dofs) } else { None };
+        let free = |dof: &DofSettings| match spherical {
+            true => DofSettings { limits: None, twist_limits: None, ..dof.clone() },
+            false => dof.clone(),
+        };
         if dofs.iter().any(|other| free(other) != free(dof)) {
             self.note(
                 &link.name,
-                "different damping or friction of one joint's degrees of freedom: the first is written",
+                "different settings of one joint's degrees of freedom: those of the first are written",
             );
         }
         let mut t = Attributes::of("name", &tree.joints[k]);
@@ -174,6 +178,21 @@ impl MjcfWriter<'_> {
                 t.put("type", "ball");
                 t.put_unless(Vec3::zeros(), "pos", at.translation.vector, vector(&at.translation.vector));
                 t.put_number(0.0, "armature", link.armature);
+                if let Some(spring) = &dof.spring {
+                    t.put_number(0.0, "stiffness", spring.stiffness);
+                    if dofs.iter().any(|dof| dof.spring.is_some_and(|spring| spring.rest != 0.0)) {
+                        self.note(
+                            &link.name,
+                            "rest orientations of spherical joints other than that of the joint are left out",
+                        );
+                    }
+                }
+                if dofs.iter().any(|dof| dof.drive != Drive::None) {
+                    self.note(&link.name, "drives of spherical joints are left out");
+                }
+                if let Some(most) = range {
+                    t.put("range", numbers([0.0, most]));
+                }
                 if at.rotation != nalgebra::one() {
                     self.note(
                         &link.name,
@@ -215,28 +234,42 @@ impl MjcfWriter<'_> {
         self.xml.leaf("joint", &t);
     }
 
+    /// Returns the largest rotation of a spherical joint, rad: that of a cone with limits of the twist that are the same about the same
+    /// axis, as the reader makes them; others are left out.
+    fn ball_range(&mut self, link: &str, dofs: &[DofSettings]) -> Option<f64> {
+        let bounded: Vec<&DofSettings> =
+            dofs.iter().filter(|dof| dof.limits.is_some() || dof.twist_limits.is_some()).collect();
+        let same = |dof: &DofSettings| {
+            let [_, cone] = dof.limits?;
+            (dof.twist_limits.is_none_or(|[lo, hi]| hi == cone && lo == -cone)).then_some(cone)
+        };
+        let range = match bounded[..] {
+            [dof] => same(dof),
+            _ => None,
+        };
+        match range {
+            Some(_) => self.note(link, "the cone and the limits of the twist become a limit of the whole rotation"),
+            None if !bounded.is_empty() => {
+                self.note(link, "cones and limits of the twist of spherical joints are left out")
+            }
+            None => {}
+        }
+        range
+    }
+
     /// Writes the shapes of a link or of the base, and frames that are fixed to it.
     fn content(&mut self, tree: &Tree<'_>, link: Option<usize>) {
-        let (body, model) = (tree.body, tree.body.model());
-        let owner = link.map_or(tree.name, |k| &model.links()[k].name).to_owned();
-        let mut left: Vec<_> = visuals(body, link).collect();
-        let Some(parts) = body.collidable() else { return };
-        for part in body.colliders_of(link) {
-            let Some(shape) = parts.shape(part) else { continue };
-            let pose = body.part_pose(part);
-            let visual = visual_of(&mut left, shape, &pose);
-            let common = self.surface(&owner, parts, part, tree.collidable, visual.map(|visual| &visual.appearance));
-            let pose = pose * about_frame(shape);
-            self.solid(&owner, (parts, part), &pose, (tree.collidable, None), &common);
+        let model = tree.body.model();
+        if let Some(number) = link.and_then(|k| model.frame_index(&model.links()[k].name)) {
+            self.shapes_of_frame(tree, number, &Pose::identity());
+            let label = self.names.get(&(tree.id, link)).cloned().unwrap_or_default();
+            self.link_bodies.insert((tree.id, number), label);
         }
-        left.into_iter().for_each(|visual| self.visual_geom(&owner, visual));
-        for frame in model.frames().iter().filter(|f| f.link == link) {
+        for (number, frame) in model.frames().iter().enumerate().filter(|(_, frame)| frame.link == link) {
             if link.is_some_and(|k| model.links()[k].name == frame.name) {
                 continue;
             }
-            let mut t = Attributes::of("name", self.sites.unique(frame.name.clone()));
-            t.put_pose(&frame.pose);
-            self.xml.leaf("site", &t);
+            self.fixed_link(tree, number);
         }
         self.joint_sites_of((tree.id, link));
     }
@@ -257,8 +290,10 @@ impl MjcfWriter<'_> {
                 let (meets, neighbors) = (parts.parts_collide(first, second), joined(*a, *b) || joined(*b, *a));
                 let names = [a, b].map(|side| self.names.get(&(tree.id, *side)).cloned().unwrap_or_default());
                 if !meets && !neighbors && names[0] != names[1] {
-                    let [first, second] = names;
-                    self.contacts.push(("exclude", Attributes::of("body1", first).with("body2", second)));
+                    let [first, second] = [a, b].map(|side| self.colliding_bodies(tree, *side));
+                    for (first, second) in first.iter().flat_map(|a| second.iter().map(move |b| (a, b))) {
+                        self.contacts.push(("exclude", Attributes::of("body1", first).with("body2", second)));
+                    }
                 } else if meets && neighbors {
                     self.note(&names[0], "links of one joint that collide: MuJoCo leaves out such contacts");
                 }

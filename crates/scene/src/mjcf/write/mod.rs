@@ -15,6 +15,7 @@
 //! Everything else is a note.
 
 mod bodies;
+mod fixed_links;
 mod geoms;
 mod joints;
 mod links;
@@ -98,6 +99,8 @@ pub struct MjcfWriter<'w> {
     actuators: Taken,
     /// Name of the body of each object, or of each link of one.
     names: BTreeMap<Carrier, String>,
+    /// Name of the body of each link with shapes, also of fixed ones, by its number among the frames of its articulated body.
+    link_bodies: BTreeMap<(ObjectId, usize), String>,
     /// Name of the joint of each single degree of freedom of an articulated body.
     dofs: BTreeMap<(ObjectId, usize), String>,
     /// Massless links that are joints of another link's body.
@@ -132,6 +135,7 @@ impl<'w> MjcfWriter<'w> {
             sites: Taken::default(),
             actuators: Taken::default(),
             names: BTreeMap::new(),
+            link_bodies: BTreeMap::new(),
             dofs: BTreeMap::new(),
             inner: BTreeSet::new(),
             joint_sites: BTreeMap::new(),
@@ -235,8 +239,8 @@ impl<'w> MjcfWriter<'w> {
             let named = |side: &PairSide| match side {
                 PairSide::Object(id) => world.get::<RigidBody>(*id).and(self.names.get(&(*id, None)).cloned()),
                 PairSide::Part(id, part) => {
-                    let link = world.get::<ArticulatedBody>(*id).and_then(|body| body.link_of(*part));
-                    self.names.get(&(*id, link)).cloned()
+                    let frame = world.get::<ArticulatedBody>(*id).and_then(|body| body.frame_of(*part));
+                    frame.and_then(|frame| self.link_bodies.get(&(*id, frame)).cloned())
                 }
                 PairSide::Material(_) => None,
             };
