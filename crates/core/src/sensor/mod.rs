@@ -31,9 +31,10 @@ pub use noise::SensorNoise;
 
 use crate::constraint::loop_joint::Anchor;
 use crate::object::frame_state::{Frame, FrameImpulse};
+use crate::object::net_sync::{read_state, write_state};
 use crate::object::part_state::StateRange;
-use crate::object::{FrameState, Object};
-use crate::world::view::ObjectId;
+use crate::object::{FrameState, NetSync, Object, SyncError};
+use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Shape;
 
 /// Maximum delay of a reading, frames.
@@ -299,6 +300,21 @@ impl Object for Sensor {
 
     fn frame_state(&self) -> Option<&dyn FrameState> {
         Some(self)
+    }
+
+    /// All its numbers are sent: a facet reads what the server reads, to the bit.
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        (self.len() > 0).then_some(self as &dyn NetSync)
+    }
+}
+
+impl NetSync for Sensor {
+    fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
+        write_state(&view.x[me.x.clone()], out);
+    }
+
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
+        read_state(data, x, |x| self.accepts(x))
     }
 }
 

@@ -144,6 +144,10 @@ pub struct ServeOptions {
     /// facets.
     #[arg(long)]
     pub contacts: bool,
+    /// Send the events of every frame, at most 1024, for programs that read them in a facet. The readings of
+    /// sensors are sent always.
+    #[arg(long)]
+    pub events: bool,
     /// Place where the world is stepped (default: as the cave says). With everywhere, each facet steps it
     /// by itself from the users' inputs, and its states are compared with the server's.
     #[arg(long, value_name = "WHERE")]

@@ -76,6 +76,13 @@ impl RunRecorder {
         self.current.as_mut().map_or(Ok(()), |(_, recording)| recording.begin())
     }
 
+    /// Takes the events of a step into the next frame.
+    pub fn step(&mut self, world: &World) {
+        if let Some((recorder, _)) = &mut self.current {
+            recorder.step(world);
+        }
+    }
+
     /// Records the last frame of a session. An error ends the recording and is printed.
     pub fn frame(&mut self, world: &World, session: &ServerSession) {
         let Some((recorder, _)) = &mut self.current else { return };
