@@ -79,8 +79,8 @@ pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use world::script::{
-    Action, CameraChange, Ends, EventError, Keyframe, LightChange, Looks, MAX_KEY_BYTES, MAX_SPAWNED, ScriptedEvent,
-    Smoothness, Spline, SplineError, SplinePoint, Subject, Template, Trigger,
+    Action, CameraChange, Ends, EventError, Firing, Keyframe, LightChange, Looks, MAX_KEY_BYTES, MAX_SPAWNED,
+    ScriptedEvent, Smoothness, Spline, SplineError, SplinePoint, Subject, Template, Trigger,
 };
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};

@@ -156,7 +156,7 @@ impl Surroundings<'_> {
         let owner = &self.owners[part as usize];
         let part = owner.part as usize;
         self.objects.at(owner.place as usize).object.collidable().is_some_and(|body| {
-            body.shape_materials(part).is_empty() && body.one_way(part).is_none() && body.intersect().is_none()
+            body.shape_materials(part).is_empty() && body.one_way(part).is_none() && body.intersect(part).is_none()
         })
     }
 

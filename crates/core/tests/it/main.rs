@@ -25,6 +25,8 @@ mod articulation_builder;
 mod assemblies;
 mod body_constants;
 mod budget;
+mod callbacks;
+mod camera_noise;
 mod cameras;
 mod chains;
 mod common;

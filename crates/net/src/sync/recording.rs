@@ -20,10 +20,10 @@ use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
 use crate::record::{
-    Contact, Deforming, Ending, MAX_EVENTS, MAX_STATE_BYTES, Pose, Reader, Readings, RecordError, RecordedEvent,
-    Recorder, RecorderOptions, Summary, read,
+    Contact, Deforming, Ending, Images, MAX_EVENTS, MAX_STATE_BYTES, Pose, Reader, Readings, RecordError,
+    RecordedEvent, Recorder, RecorderOptions, Summary, read,
 };
-use crate::world::{contacts, deforming, entities, events, names, poses, readings};
+use crate::world::{contacts, deforming, entities, events, images, names, poses, readings};
 use std::path::Path;
 use std::sync::Arc;
 use tumble_core::World;
@@ -52,6 +52,7 @@ struct WaitingFrame {
     deforming: Deforming,
     readings: Readings,
     events: Vec<RecordedEvent>,
+    images: Images,
     /// Messages so far.
     messages: Vec<u8>,
 }
@@ -69,6 +70,8 @@ pub struct SessionRecorder {
     /// Events of the steps since the last recorded frame.
     steps: Vec<RecordedEvent>,
     last_step: LastStep,
+    /// Whether images of cameras are recorded.
+    cameras: bool,
     list: Option<Arc<Vec<u8>>>,
     names: Vec<String>,
     scene: [u8; 32],
@@ -104,12 +107,20 @@ impl SessionRecorder {
             notes: Vec::new(),
             steps: Vec::new(),
             last_step: LastStep::default(),
+            cameras: false,
             list: None,
             names,
             scene,
             last_s: 0.0,
             shift_s: 0.0,
         })
+    }
+
+    /// Records the images of all cameras with each recorded frame. By default there are none.
+    #[must_use]
+    pub fn with_cameras(mut self, cameras: bool) -> SessionRecorder {
+        self.cameras = cameras;
+        self
     }
 
     /// Takes the events of the world's last step into the next recorded frame. A program that makes several steps a frame calls
@@ -166,6 +177,7 @@ impl SessionRecorder {
             deforming: deforming(world),
             readings: readings(world),
             events: std::mem::take(&mut self.steps),
+            images: if self.cameras { images(world) } else { Images::new() },
             messages: out,
         });
         Ok(())
@@ -208,8 +220,9 @@ impl SessionRecorder {
     fn write_waiting(&mut self) -> Result<(), RecordError> {
         let Some(mut waiting) = self.waiting.take() else { return Ok(()) };
         waiting.messages.append(&mut self.notes);
-        let WaitingFrame { frame, time_s, poses, contacts, deforming, readings, events, messages } = waiting;
+        let WaitingFrame { frame, time_s, poses, contacts, deforming, readings, events, images, messages } = waiting;
         self.recorder.report(&readings, &events)?;
+        self.recorder.images(&images)?;
         self.recorder.deforming(time_s, &deforming)?;
         self.recorder.frame(time_s, frame, &poses, &contacts, &messages)
     }

@@ -18,7 +18,7 @@ use tumble::dynamics::{ArchiveError, ArticulatedBody, Drive, ObjectId, World as 
 use tumble::scene::{CameraSpec, CavePlace, GroundSpec, LightSpec, SceneFile, SkySpec};
 
 /// The first bytes of a pickled world and a pickled shape. The number is raised with every change of their content.
-const WORLD: &[u8; 8] = b"tumbleW4";
+const WORLD: &[u8; 8] = b"tumbleW5";
 const SHAPE: &[u8; 8] = b"tumbleG3";
 
 /// A world.

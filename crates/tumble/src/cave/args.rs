@@ -84,6 +84,9 @@ pub struct ServeOptions {
     /// Record states, inputs and acknowledgements (MCAP), instead of [recording] in the cave file.
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Write the images of all cameras to the recording, also to that of the cave file.
+    #[arg(long)]
+    pub record_cameras: bool,
     /// Write counts and timings (JSON).
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,

@@ -4,13 +4,13 @@ use super::simulated_session::{SCENE, viewer};
 use crate::support::Scratch;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::{
-    Anchor, EventKind, LoopJoint, LoopJointKind, Material, RigidBody, ScriptedEvent, Sensor, SensorKind, SensorNoise,
-    Settings, Sleep, Trigger, World,
+    Anchor, EventKind, LoopJoint, LoopJointKind, Material, Optics, RigidBody, ScriptedEvent, Sensor, SensorKind,
+    SensorNoise, Settings, Sleep, Trigger, World,
 };
-use tumble_net::record::{Readings, RecordedEvent, RecorderOptions, read};
+use tumble_net::record::{Images, Readings, RecordedEvent, RecorderOptions, read};
 use tumble_net::sync::wire::MessageError;
 use tumble_net::sync::*;
-use tumble_net::world::{events, readings};
+use tumble_net::world::{events, images, readings};
 
 /// Balls that bounce and come to rest, a gate through which they fall, a joint that breaks, an event that fires, and sensors with
 /// and without errors.
@@ -46,6 +46,13 @@ fn scene() -> World {
     let noise = SensorNoise { deviation: 0.1, bias_walk: 0.01, delay: 2, seed: 5, ..SensorNoise::default() };
     let imu = Sensor::new("imu", SensorKind::Accelerometer, on(balls[1])).unwrap();
     world.add(imu.with_noise(noise).unwrap()).unwrap();
+    let down = Anchor::world(Pose::new(Vec3::new(0.0, 0.0, 2.0), Vec3::x() * std::f64::consts::PI));
+    let optics = Optics { resolution: [4, 3], vertical_fov: 1.0 };
+    for kind in [SensorKind::Depth, SensorKind::Color, SensorKind::Segmentation] {
+        let camera = Sensor::new(kind.name(), kind, down).unwrap().with_optics(optics).unwrap();
+        let delay = if kind == SensorKind::Color { 2 } else { 0 };
+        world.add(camera.with_noise(SensorNoise { delay, ..SensorNoise::default() }).unwrap()).unwrap();
+    }
     world
 }
 
@@ -85,6 +92,9 @@ fn a_facet_reads_the_events_of_all_steps_of_its_frame_and_the_readings_of_the_se
                 assert_eq!(facet.hash(), published.hash);
                 assert_eq!(seen(facet.world()), expected, "frame {frame}");
                 assert_eq!(readings(facet.world()), readings(&world), "frame {frame}");
+                // a late image is a reading like others
+                let late = |world: &World| world.color_image(world.find("color").unwrap()).unwrap();
+                assert_eq!(late(facet.world()), late(&world), "frame {frame}");
             }
             kinds.extend(expected.iter().map(|e| e.0));
         }
@@ -196,7 +206,8 @@ fn the_recording_of_a_session_has_sensors_and_events() {
         let mut session = ServerSession::new(ServerOptions::new(1, SCENE, slots), &world);
         let mut recorder =
             SessionRecorder::create(&path, "test", SCENE, &world, every, RecorderOptions::default()).unwrap();
-        let mut expected: Vec<(Readings, Vec<RecordedEvent>)> = Vec::new();
+        recorder = recorder.with_cameras(steps == 2);
+        let mut expected: Vec<(Readings, Vec<RecordedEvent>, Images)> = Vec::new();
         let mut happened = Vec::new();
         for frame in 0..240 {
             for _ in 0..if frame > 0 { steps } else { 0 } {
@@ -207,19 +218,20 @@ fn the_recording_of_a_session_has_sensors_and_events() {
             session.publish(std::time::Duration::from_millis(4 * frame), &world, &viewer(frame)).unwrap();
             recorder.frame(&world, session.recorded(frame == 0).unwrap()).unwrap();
             if frame % u64::from(every) == 0 {
-                expected.push((readings(&world), std::mem::take(&mut happened)));
+                let seen = if steps == 2 { images(&world) } else { Images::new() };
+                expected.push((readings(&world), std::mem::take(&mut happened), seen));
             }
         }
         recorder.finish().unwrap();
         let recorded: Vec<_> =
-            read(&path).unwrap().map(|frame| frame.unwrap()).map(|f| (f.sensors, f.events)).collect();
+            read(&path).unwrap().map(|frame| frame.unwrap()).map(|f| (f.sensors, f.events, f.images)).collect();
         assert_eq!(recorded, expected);
-        let kinds: Vec<&str> = expected.iter().flat_map(|(_, events)| events).map(|e| e.kind.as_str()).collect();
+        let kinds: Vec<&str> = expected.iter().flat_map(|(_, events, _)| events).map(|e| e.kind.as_str()).collect();
         assert!(
             ["contact_begin", "sensor_begin", "joint_broken", "fired", "asleep"]
                 .iter()
                 .all(|kind| kinds.contains(kind))
         );
-        assert!(expected.iter().all(|(readings, _)| readings.len() == 2));
+        assert!(expected.iter().all(|(readings, ..)| readings.len() == 2));
     }
 }
