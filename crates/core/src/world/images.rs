@@ -183,7 +183,7 @@ fn quantized(value: f64, step: f64) -> f64 {
     if step > 0.0 { step * (value / step).round() } else { value }
 }
 
-/// Parts of an object that a number of a late segmentation can tell apart.
+/// Number of parts of an object that a late segmentation distinguishes.
 const PARTS: f64 = 2_097_152.0;
 
 /// Light from all sides, of a surface that faces the camera.

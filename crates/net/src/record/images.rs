@@ -28,7 +28,7 @@ pub(crate) const IMAGE_SCHEMA: &str = "foxglove.RawImage";
 const DEPTH: &str = "32FC1";
 const COLOR: &str = "rgb8";
 const PARTS: &str = "16UC1";
-/// Entities that the numbers of a segmentation can tell apart.
+/// Number of entities that a segmentation distinguishes.
 const MAX_SEEN: u32 = u16::MAX as u32;
 
 /// The pixels of an image, by rows from the top.
@@ -120,7 +120,7 @@ pub(crate) fn encode_image(name: &str, image: &RecordedImage) -> std::result::Re
         Pixels::Color(colors) => (COLOR, colors.iter().flatten().copied().collect()),
         Pixels::Parts(parts) => {
             if let Some(part) = parts.iter().flatten().find(|part| **part >= MAX_SEEN) {
-                return wrong(format!("it sees entity {part}; {MAX_SEEN} can be told apart"));
+                return wrong(format!("it sees entity {part}; the first {MAX_SEEN} can be recorded"));
             }
             let number = |part: &Option<u32>| part.map_or(0, |part| part as u16 + 1).to_le_bytes();
             (PARTS, parts.iter().flat_map(number).collect())

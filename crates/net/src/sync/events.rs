@@ -176,7 +176,7 @@ fn vector(rest: &mut ByteReader<'_>) -> Result<Vec3, MessageError> {
 mod tests {
     use super::*;
 
-    /// Of too many events those that persist go first, the smallest first; the others keep their order.
+    /// Contacts that persist go first, the smallest first; the others keep their order.
     #[test]
     fn of_too_many_events_the_smallest_that_persist_are_left_out() {
         let mut world = World::default();

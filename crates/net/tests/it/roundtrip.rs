@@ -209,7 +209,7 @@ fn images_of_cameras_are_read_as_they_were_written() {
         };
         wrong(Pixels::Depth(vec![1.0]), "1 pixels for 2 x 1");
         wrong(Pixels::Depth(vec![1.0, f32::NAN]), "not finite");
-        wrong(Pixels::Parts(vec![None, Some(65_535)]), "entity 65535; 65535 can be told apart");
+        wrong(Pixels::Parts(vec![None, Some(65_535)]), "entity 65535; the first 65535 can be recorded");
         recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
     }
     let many = (0..=MAX_CAMERAS).map(|k| (format!("camera {k}"), images(0)["eye"].clone())).collect();

@@ -1680,6 +1680,7 @@ class Articulation:
 
         shape: name, or number as ``shapes`` of contacts has it.
         """
+    def set_intersect(self, link: str, test: Intersect | None, shape: int | str | None = None) -> None: ...
     def set_shape_material(
         self,
         link: str,
@@ -2175,7 +2176,7 @@ class Recorder:
     The file is created by the first frame. After a crash the file is readable up to the last
     quarter of a simulated second.
     """
-    def __new__(cls, path: _Path) -> Recorder: ...
+    def __new__(cls, path: _Path, *, cameras: bool = False) -> Recorder: ...
     def frame(self, world: World) -> None:
         """Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
         each once.

@@ -23,7 +23,7 @@ pub struct Firing {
 }
 
 impl Firing {
-    /// Returns the firing that an event of kind [`EventKind::Fired`] of the world's last frame tells of. Of several contacts
+    /// Returns the firing behind an event of kind [`EventKind::Fired`] of the world's last frame. Of several contacts
     /// that made it fire it has the one with the largest impulse.
     pub fn of(world: &World, fired: &Event) -> Firing {
         let trigger = world.get::<ScriptedEvent>(fired.a).map(ScriptedEvent::trigger);
