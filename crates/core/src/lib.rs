@@ -74,7 +74,9 @@ pub use object::{
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};
-pub use sensor::{MAX_DELAY, MAX_DELAYED_PIXELS, Optics, Sensor, SensorError, SensorImage, SensorKind, SensorNoise, SensorPlace};
+pub use sensor::{
+    MAX_DELAY, MAX_DELAYED_PIXELS, Optics, Sensor, SensorError, SensorImage, SensorKind, SensorNoise, SensorPlace,
+};
 pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;

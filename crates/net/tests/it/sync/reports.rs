@@ -189,7 +189,7 @@ fn malformed_reports_are_refused_and_change_nothing() {
     let bytes: Vec<u8> = felt.iter().flat_map(|x| x.to_le_bytes()).collect();
     let head = [8, 0, 0, 0];
     let body = |k: &usize| state[*k..].starts_with(&head) && state[*k + 4..].starts_with(&bytes);
-    let at = (0..start).filter(body).last().expect("the reading of 'felt'");
+    let at = (0..start).rfind(body).expect("the reading of 'felt'");
     refused(&with(at + 4, &f64::INFINITY.to_le_bytes()), "not finite");
     assert!(matches!(mirror.apply_state(2, 1.0, &[]), Err(MessageError::Malformed(_))));
 }
