@@ -74,13 +74,15 @@ pub use object::{
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};
-pub use sensor::{MAX_DELAY, Optics, Sensor, SensorError, SensorImage, SensorKind, SensorNoise, SensorPlace};
+pub use sensor::{
+    MAX_DELAY, MAX_DELAYED_PIXELS, Optics, Sensor, SensorError, SensorImage, SensorKind, SensorNoise, SensorPlace,
+};
 pub use settings::{Integrator, Settings, SettingsError};
 pub use step::{Backtracking, STEPPERS, StepContext, Stepper, TimeStepping, stepper_by_name};
 pub use tumble_collide as collide;
 pub use world::script::{
-    Action, CameraChange, Ends, EventError, Keyframe, LightChange, Looks, MAX_KEY_BYTES, MAX_SPAWNED, ScriptedEvent,
-    Smoothness, Spline, SplineError, SplinePoint, Subject, Template, Trigger,
+    Action, CameraChange, Ends, EventError, Firing, Keyframe, LightChange, Looks, MAX_KEY_BYTES, MAX_SPAWNED,
+    ScriptedEvent, Smoothness, Spline, SplineError, SplinePoint, Subject, Template, Trigger,
 };
 pub use world::sleep::Sleep;
 pub use world::view::{Mode, ObjectId, Status, WorldView};

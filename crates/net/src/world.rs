@@ -2,8 +2,8 @@
 
 use crate::names::{Names, Site, shortened};
 use crate::record::{
-    Contact, Deforming, Entity, MAX_CONTACTS, MAX_EVENTS, Point, Pose, Readings, RecordedEvent, Shape, Surface,
-    VisualPart,
+    Contact, Deforming, Entity, Images, MAX_CONTACTS, MAX_EVENTS, Pixels, Point, Pose, Readings, RecordedEvent,
+    RecordedImage, Shape, Surface, VisualPart,
 };
 use nalgebra::Translation3;
 use std::collections::BTreeMap;
@@ -79,6 +79,29 @@ pub fn contacts(world: &World) -> Vec<Contact> {
 /// Returns the readings of all measuring sensors by name; long names as those of [`entities`].
 pub fn readings(world: &World) -> Readings {
     let one = |id| Some((shortened(world.name(id)?.to_owned()), world.reading(id)?.to_vec()));
+    world.sensors().filter_map(one).collect()
+}
+
+/// Returns the images of all cameras by name; long names as those of [`entities`], whose indices are in segmentations. Each image
+/// is made now.
+pub fn images(world: &World) -> Images {
+    let index: BTreeMap<Site, u32> = sites(world).zip(0..).collect();
+    let entity = |part: Option<(ObjectId, usize)>| {
+        let (id, part) = part?;
+        index.get(&Site::of_part(world, id, part)?).copied()
+    };
+    let one = |id| {
+        let (width, height, pixels) = if let Some(image) = world.depth_image(id) {
+            (image.width, image.height, Pixels::Depth(image.pixels.iter().map(|depth| *depth as f32).collect()))
+        } else if let Some(image) = world.color_image(id) {
+            (image.width, image.height, Pixels::Color(image.pixels))
+        } else {
+            let image = world.segmentation_image(id)?;
+            (image.width, image.height, Pixels::Parts(image.pixels.into_iter().map(entity).collect()))
+        };
+        let image = RecordedImage { width: width as u32, height: height as u32, pixels };
+        Some((shortened(world.name(id)?.to_owned()), image))
+    };
     world.sensors().filter_map(one).collect()
 }
 

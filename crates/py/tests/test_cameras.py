@@ -82,14 +82,43 @@ def test_noise_of_a_camera_and_wrong_arguments():
     for arguments, why in [
         ({"kind": "depth", "resolution": (0, 5)}, "number of pixels"),
         ({"kind": "depth", "vertical_fov": 4.0}, "angle of view"),
-        ({"kind": "depth", "delay": 3}, "no delay"),
+        ({"kind": "depth", "resolution": (1000, 1000), "delay": 5}, "pixels that its delay keeps is 5000000; it must be at most 4194304"),
         ({"kind": "segmentation", "deviation": 0.1}, "no noise"),
+        ({"kind": "segmentation", "bias_walk": 0.1}, "it may have a delay"),
         ({"kind": "gyroscope", "resolution": (5, 5)}, "only cameras"),
     ]:
         with pytest.raises(ValueError, match=why):
             world.add_sensor(**arguments)
     with pytest.raises(ValueError, match="camera"):
         tumble.Batch(world, 2).sensor("eye")
+
+
+@pytest.mark.parametrize("kind", ["depth", "color", "segmentation"])
+def test_images_that_are_late_and_have_a_bias(kind, tmp_path):
+    noise = {} if kind == "segmentation" else {"deviation": 0.01, "bias_walk": 0.5, "seed": 7}
+    worlds = []
+    for delay in (0, 2):
+        world = tumble.World()
+        world.add_static("ground", tumble.HalfSpace())
+        world.add_rigid("ball", tumble.Sphere(0.2), mass=1, position=(0, 0, 2))
+        eye = {"position": (0, 0, 3), "orientation": (1, 0, 0, 0), "resolution": (20, 15)}
+        world.add_sensor(kind, name="eye", delay=delay, **noise, **eye)
+        worlds.append(world)
+    prompt, late = worlds
+    images = [prompt.sensors["eye"]]
+    for _ in range(40):
+        prompt.step()
+        late.step()
+        images.append(prompt.sensors["eye"])
+        assert (late.sensors["eye"] == images[max(len(images) - 3, 0)]).all()
+    assert (images[-1] != images[0]).any()
+    late.save_scene(tmp_path / "late.toml")
+    assert "delay = 2" in (tmp_path / "late.toml").read_text()
+    copies = [late.fork(), pickle.loads(pickle.dumps(late)), tumble.World.load(tmp_path / "late.toml")]
+    late.step(5)
+    for copied in copies:
+        copied.step(5)
+        assert (copied.sensors["eye"] == late.sensors["eye"]).all()
 
 
 def test_a_scene_with_cameras(tmp_path):

@@ -66,6 +66,64 @@ def test_copies_have_the_test_and_the_same_bits():
     world.step()
 
 
+class Filter(tumble.Intersect):
+    """Lets the left board, and all that is called ghost, pass."""
+
+    def contacts(self, own, other, margin):
+        assert own.name == "shelf" and own.link == "lower" and other.link is None
+        return [] if own.shape_name == "left" or other.name.startswith("ghost") else None
+
+
+def shelf_and_balls():
+    board = tumble.Box((1, 1, 0.1))
+    builder = tumble.ArticulationBuilder("shelf")
+    builder.add_link("lower", joint="fixed", position=(0, 0, 0.5))
+    builder.add_shape("lower", board.named("left"), position=(-0.5, 0, 0))
+    builder.add_shape("lower", board.named("right"), position=(0.5, 0, 0))
+    world = tumble.World()
+    shelf = world.add_articulation(builder)
+    for name, x in (("left ball", -0.5), ("right ball", 0.3), ("ghost", 0.7)):
+        world.add_rigid(name, tumble.Sphere(0.1), mass=1, position=(x, 0, 1))
+    return world, shelf
+
+
+def held(world):
+    world.step(240)
+    return [bool(world[name].position[2] > 0.6) for name in ("left ball", "right ball", "ghost")]
+
+
+def test_a_link_or_one_of_its_shapes_has_a_filter():
+    world, shelf = shelf_and_balls()
+    assert held(world) == [True, True, True]
+    for shape, expected in ((None, [False, True, False]), ("right", [True, True, False]), (0, [False, True, True])):
+        world, shelf = shelf_and_balls()
+        shelf.set_intersect("lower", Filter(), shape)
+        copies = [world.fork(), pickle.loads(pickle.dumps(world))]
+        assert held(world) == expected
+        for copy in copies:
+            copy.step(240)
+            assert (copy.state == world.state).all()
+    world, shelf = shelf_and_balls()
+    shelf.set_intersect("lower", Filter())
+    shelf.set_intersect("lower", None, "left")
+    assert held(world.fork()) == held(world) == [True, True, False]
+    shelf.set_intersect("lower", None)
+    world.model()
+
+
+def test_filters_of_links_that_are_not_there_are_refused():
+    world, shelf = shelf_and_balls()
+    with pytest.raises(tumble.UnknownNameError, match="middle"):
+        shelf.set_intersect("middle", Filter())
+    with pytest.raises(tumble.InvalidValueError, match="no shape 2; it has 2"):
+        shelf.set_intersect("lower", Filter(), 2)
+    with pytest.raises(TypeError, match="Intersect"):
+        shelf.set_intersect("lower", 3)
+    shelf.set_intersect("lower", Wrong(KeyError("here")))
+    with pytest.raises(KeyError, match="here"):
+        world.step(240)
+
+
 class Wrong(tumble.Intersect):
     def __init__(self, answer):
         self.answer = answer

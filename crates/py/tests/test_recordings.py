@@ -144,3 +144,37 @@ def test_files_that_are_not_there_are_file_errors(tmp_path):
             world = thrown()
             recorder.frame(world)
             recorder.frame(world)
+
+
+def test_images_of_cameras_are_recorded_if_asked_for(tmp_path):
+    def made():
+        world = tumble.World()
+        world.add_static("ground", tumble.HalfSpace())
+        world.add_rigid("ball", tumble.Sphere(0.2), mass=1, position=(0, 0, 1)).color = (1, 0, 0)
+        eye = {"position": (0, 0, 2), "orientation": (1, 0, 0, 0), "resolution": (7, 5)}
+        for kind in ("depth", "color", "segmentation"):
+            world.add_sensor(kind, name=kind, **eye)
+        world.add_sensor("depth", name="late", delay=3, deviation=0.01, cutoff=1.3, **eye)
+        return world
+
+    path, world, images = tmp_path / "seen.mcap", made(), []
+    with tumble.Recorder(path, cameras=True) as recorder:
+        for _ in range(30):
+            recorder.frame(world)
+            images.append({name: world.sensors[name] for name in world.sensors})
+            world.step()
+    recording = tumble.read(path)
+    assert list(recording.images) == ["color", "depth", "late", "segmentation"] and recording.sensors == {}
+    for name in ("depth", "late"):
+        assert recording.images[name].dtype == np.float32
+        assert (recording.images[name] == np.array([image[name] for image in images], np.float32)).all()
+    assert (recording.images["color"] == np.array([image["color"] for image in images])).all()
+    parts = recording.images["segmentation"]
+    assert parts.shape == (30, 5, 7) and parts.dtype == np.int32
+    bodies = np.array([image["segmentation"][..., 0] for image in images])
+    names = [body.name for body in world.bodies]
+    assert all(recording.names[part] == names[body] for part, body in zip(parts[parts >= 0], bodies[parts >= 0], strict=True))
+    assert ((parts < 0) == (bodies < 0)).all() and (parts[0] >= 0).all()
+    with tumble.Recorder(path) as recorder:
+        recorder.run(made(), 3)
+    assert tumble.read(path).images == {}

@@ -13,8 +13,8 @@ use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 use tumble::dynamics::World;
-use tumble::net::record::{Recorder, RecorderOptions};
-use tumble::net::world::{contacts, deforming, entities, events, poses, readings};
+use tumble::net::record::{Images, Recorder, RecorderOptions};
+use tumble::net::world::{contacts, deforming, entities, events, images, poses, readings};
 use tumble::scene::{SceneFile, SceneWriter, open_file, visual_notes};
 
 /// Largest saved state that is read: a thousand times the size of one of ten thousand bodies.
@@ -111,6 +111,7 @@ fn simulate(
     let mut record = |world: &World| match &mut recorder {
         Some(r) => r
             .report(&readings(world), &events(world))
+            .and_then(|()| r.images(&if options.record_cameras { images(world) } else { Images::new() }))
             .and_then(|()| r.deforming(world.time(), &deforming(world)))
             .and_then(|()| r.frame(world.time(), world.frame(), &poses(world), &contacts(world), &world.save()))
             .map_err(|e| Failure::run("recording", e)),

@@ -102,7 +102,7 @@ impl Collidable for Torus {
     fn shape(&self, _part: usize) -> Option<&Shape> {
         Some(self.body.shape())
     }
-    fn intersect(&self) -> Option<&dyn Intersect> {
+    fn intersect(&self, _part: usize) -> Option<&dyn Intersect> {
         Some(self)
     }
     fn material(&self, part: usize) -> Material {

@@ -70,9 +70,11 @@ pub enum ArchiveError {
     /// A value cannot be written, such as a path that is not UTF-8.
     #[error("the world cannot be written: {0}")]
     Unwritable(String),
-    /// An object of a user-defined type, or with an intersection test of one, that the caller does not write, or does not
-    /// make.
-    #[error("'{0}' is, or has a test of, a user-defined type, and the caller gave nothing to write or to make it")]
+    /// An object of a user-defined type, or with an intersection test or a callback of one, that the caller does not write, or
+    /// does not make.
+    #[error(
+        "'{0}' is, or has a test or a callback of, a user-defined type, and the caller gave nothing to write or to make it"
+    )]
     Foreign(String),
     /// A stepper of a user-defined type, or of another version of tumble: its name.
     #[error(
@@ -158,9 +160,7 @@ impl World {
             .collect::<Vec<NamedRecord>>();
         let unknown = self.ids().iter().zip(&objects).find_map(|(id, object)| match object.record {
             Record::Foreign if !foreign.contains(id) => Some(object.name.clone()),
-            Record::Rigid(_) if !foreign.contains(id) && has_test(self.get::<RigidBody>(*id)) => {
-                Some(object.name.clone())
-            }
+            _ if !foreign.contains(id) && has_function(self.object(*id)?) => Some(object.name.clone()),
             _ => None,
         });
         if let Some(name) = unknown {
@@ -290,8 +290,12 @@ fn solver(name: &str) -> Result<Box<dyn RowSolver>, ArchiveError> {
     solver::by_name(name).ok_or_else(|| ArchiveError::Solver(name.into()))
 }
 
-fn has_test(body: Option<&RigidBody>) -> bool {
-    body.is_some_and(|body| body.intersect().is_some())
+/// Returns whether an object has a function of the program: an intersection test, or callbacks.
+fn has_function(object: &dyn Object) -> bool {
+    let any: &dyn std::any::Any = object;
+    any.downcast_ref::<RigidBody>().is_some_and(|body| body.intersect().is_some())
+        || any.downcast_ref::<ArticulatedBody>().is_some_and(ArticulatedBody::has_intersect)
+        || any.downcast_ref::<ScriptedEvent>().is_some_and(ScriptedEvent::has_calls)
 }
 
 fn record(object: &dyn Object, tables: &mut Tables, indices: &ObjectIndices) -> Record {

@@ -252,7 +252,7 @@ impl ArticulatedBody {
         let frame = &self.model.frames()[number];
         let center = Translation3::from(collider.shape.center_of_mass());
         collider.pose = frame.pose * (collider.pose * center);
-        self.colliders.push(LinkCollider { link: frame.link, frame: number, collider });
+        self.colliders.push(LinkCollider { intersect: None, link: frame.link, frame: number, collider });
         Ok(())
     }
 

@@ -1,7 +1,8 @@
 //! Shapes on links.
 
 use crate::object::collidable::CollisionGroup;
-use crate::object::{Material, ShapeFilter, ShapeFilters, ShapeMaterials};
+use crate::object::{Intersect, Material, ShapeFilter, ShapeFilters, ShapeMaterials};
+use std::sync::Arc;
 use tumble_collide::{ContactMode, Pose, Shape, Vec3};
 
 /// A shape on a link.
@@ -115,6 +116,8 @@ impl Collider {
 /// A collider with its link.
 #[derive(Clone)]
 pub(super) struct LinkCollider {
+    /// An intersection test of its own.
+    pub intersect: Option<Arc<dyn Intersect>>,
     /// Moving link; `None` for the base.
     pub link: Option<usize>,
     /// Index in [`Model::frames`](super::Model::frames) of the link that it was added to.

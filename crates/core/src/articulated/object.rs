@@ -15,7 +15,7 @@ use crate::object::mounts::{CameraCarrier, CameraMount, LightCarrier, LightMount
 use crate::object::net_sync;
 use crate::object::part_state::{ForceSlice, Forces, PartPoint, PartState, PointLoad, StateRange, StateSizes, Wrench};
 use crate::object::visual::Visual;
-use crate::object::{Constraint, Energy, Integratable, Momentum, NetSync, Object, Renderable, SyncError};
+use crate::object::{Constraint, Energy, Integratable, Intersect, Momentum, NetSync, Object, Renderable, SyncError};
 use crate::object::{Material, ShapeFilter};
 use crate::rigid::rotation;
 use crate::rigid::vec3;
@@ -310,6 +310,10 @@ impl Collidable for ArticulatedBody {
 
     fn shape_name(&self, part: usize, shape: usize) -> Option<&str> {
         name_of(&self.collider(part)?.collider, shape)
+    }
+
+    fn intersect(&self, part: usize) -> Option<&dyn Intersect> {
+        self.collider(part)?.intersect.as_deref()
     }
 
     fn one_way(&self, part: usize) -> Option<Vec3> {

@@ -83,7 +83,7 @@ impl ArticulatedBody {
                 return Err(self.no_link(&format!("number {frame}")));
             };
             self.check_read(frame, &collider)?;
-            self.colliders.push(LinkCollider { link, frame, collider });
+            self.colliders.push(LinkCollider { intersect: None, link, frame, collider });
         }
         (self.visual_links, self.visuals) = visuals.into_iter().unzip();
         let parts = self.model.links().len() + 1;

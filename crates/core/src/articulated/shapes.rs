@@ -6,8 +6,9 @@
 use super::body::{ArticulatedBody, ArticulatedError};
 use super::collider::Collider;
 use crate::BodyError;
-use crate::object::Material;
+use crate::object::{Intersect, Material};
 use crate::rigid::check_shape_name;
+use std::sync::Arc;
 use tumble_collide::{Shape, Vec3};
 
 impl ArticulatedBody {
@@ -68,6 +69,75 @@ impl ArticulatedBody {
             (false, None) => {}
         }
         Ok(())
+    }
+
+    /// Sets or removes an intersection test of its own of a shape of a link, by its number among the shapes of the link (a
+    /// part of a compound stands for the whole compound), or of all of them for `None`. The link may be a fixed one: the
+    /// shapes of others that are fixed to it are not meant. A test that makes no contacts is a filter: it decides with what
+    /// the link collides. An archive does not have it.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use tumble_core::collide::Contact;
+    /// use tumble_core::{ArticulationBuilder, Intersect, IntersectPart, Joint, LinkBuilder, prelude::*};
+    /// /// Whatever is named "ghost" passes through.
+    /// struct Solid;
+    /// impl Intersect for Solid {
+    ///     fn contacts(&self, own: &IntersectPart, other: &IntersectPart, _: f64, _: &mut Vec<Contact>) -> bool {
+    ///         assert_eq!((own.name(), own.link(), own.shape_name()), ("shelf", Some("lower"), Some("board")));
+    ///         other.name() == "ghost" // no contacts: they do not collide; false leaves the pair to the shapes
+    ///     }
+    /// }
+    /// let board = Shape::cuboid(Vec3::new(2.0, 2.0, 0.1))?;
+    /// let mut shelf = ArticulationBuilder::new("shelf");
+    /// for (name, height) in [("lower", 0.5), ("upper", 1.5)] {
+    ///     let link = LinkBuilder::new(name, Joint::Fixed).with_pose(Pose::translation(0.0, 0.0, height));
+    ///     shelf = shelf.link(link.with_shape(board.clone(), Pose::identity()).with_shape_name("board"));
+    /// }
+    /// let mut shelf = shelf.build()?;
+    /// shelf.set_intersect("lower", None, Some(Arc::new(Solid)))?;
+    /// let mut world = World::default();
+    /// world.add(shelf)?;
+    /// let mut drop = |name: &str, x: f64, z: f64| {
+    ///     let ball = RigidBody::new(Shape::sphere(0.1)?).with_name(name).with_mass(1.0);
+    ///     Ok::<_, Box<dyn std::error::Error>>(world.add(ball.with_pose(Pose::translation(x, 0.0, z)))?)
+    /// };
+    /// let (ghost, ball) = (drop("ghost", 0.0, 1.0)?, drop("ball", 0.5, 1.0)?);
+    /// while world.time() < 1.0 {
+    ///     world.step()?;
+    /// }
+    /// assert!(world.body(ghost)?.position().z < -1.0 && (world.body(ball)?.position().z - 0.65).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`], [`ArticulatedError::Collider`] if the link has no such shape.
+    pub fn set_intersect(
+        &mut self,
+        link: &str,
+        shape: Option<usize>,
+        test: Option<Arc<dyn Intersect>>,
+    ) -> Result<(), ArticulatedError> {
+        let frame = self.model.frame_index(link).ok_or_else(|| self.no_link(link))?;
+        let meant = |(number, _): &(usize, usize)| shape.is_none_or(|shape| shape == *number);
+        let parts: Vec<usize> =
+            self.shapes_of(frame).map(|(part, ..)| part).enumerate().filter(meant).map(|(_, part)| part).collect();
+        if parts.is_empty() {
+            let (what, value) = ("number of a shape", shape.unwrap_or(0) as f64);
+            let why = BodyError::Range { what, value, expected: "below the number of shapes of the link" };
+            return Err(ArticulatedError::Collider { body: self.name.clone(), link: link.into(), why });
+        }
+        for part in parts {
+            if let Some(found) = self.collider_mut(part) {
+                found.intersect.clone_from(&test);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether a shape of it has an [intersection test of its own](Self::set_intersect).
+    pub fn has_intersect(&self) -> bool {
+        self.colliders.iter().any(|found| found.intersect.is_some())
     }
 
     /// Checks a collider that is added to a link, an index in the model's frames.

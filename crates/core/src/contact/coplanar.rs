@@ -159,7 +159,7 @@ impl Surroundings<'_> {
             body.shape_materials(part).is_empty()
                 && body.shape_filters(part).is_empty()
                 && body.one_way(part).is_none()
-                && body.intersect().is_none()
+                && body.intersect(part).is_none()
         })
     }
 

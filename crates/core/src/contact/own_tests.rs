@@ -31,7 +31,8 @@ impl<'a> OwnTests<'a> {
     pub fn of(sides: [(&'a dyn Object, usize); 2]) -> OwnTests<'a> {
         let sides = sides.map(|(object, part)| {
             let body = object.collidable();
-            let (test, one_way) = (body.and_then(|body| body.intersect()), body.and_then(|body| body.one_way(part)));
+            let (test, one_way) =
+                (body.and_then(|body| body.intersect(part)), body.and_then(|body| body.one_way(part)));
             Side { object, part, test, one_way }
         });
         OwnTests(sides.iter().any(|side| side.test.is_some() || side.one_way.is_some()).then_some(sides))

@@ -47,8 +47,9 @@ pub trait Collidable {
     /// Returns the shape of a part, in the part's frame; `None` for a part that never collides: one
     /// for forces, joints or visuals.
     fn shape(&self, part: usize) -> Option<&Shape>;
-    /// Returns the object's own intersection test; `None` for contacts of its shapes.
-    fn intersect(&self) -> Option<&dyn Intersect> {
+    /// Returns the intersection test of a part's own; `None` for contacts of its shape.
+    fn intersect(&self, part: usize) -> Option<&dyn Intersect> {
+        let _ = part;
         None
     }
     /// Returns the direction, unit, in the frame of the part, of a part that collides on one side only: with what

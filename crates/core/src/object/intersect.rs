@@ -16,6 +16,23 @@ pub struct IntersectPart<'a> {
     pub pose: &'a Pose,
 }
 
+impl<'a> IntersectPart<'a> {
+    /// Returns the name of its object; empty for one that the world named.
+    pub fn name(&self) -> &'a str {
+        self.object.name()
+    }
+
+    /// Returns the name of the link whose shape it is, as its user named it; `None` for all but articulated bodies.
+    pub fn link(&self) -> Option<&'a str> {
+        self.object.collidable()?.part_name(self.part)
+    }
+
+    /// Returns the [name](super::Collidable::shape_name) of its shape; of a compound, which has several, that of the first.
+    pub fn shape_name(&self) -> Option<&'a str> {
+        self.object.collidable()?.shape_name(self.part, 0)
+    }
+}
+
 /// An intersection test of an object's own: the narrow phase of all pairs with a part of it.
 ///
 /// [`Collidable::shape`](super::Collidable::shape) then is a solid around the true surface. The broad phase,

@@ -456,7 +456,7 @@ impl Collidable for RigidBody {
         self.mask & other.bit() != 0
     }
 
-    fn intersect(&self) -> Option<&dyn Intersect> {
+    fn intersect(&self, _part: usize) -> Option<&dyn Intersect> {
         self.intersect.as_deref()
     }
 

@@ -7,7 +7,9 @@
 //!
 //! The camera looks along the z axis of its site, x points right in the image and y down: the axes of computer vision. An
 //! image is a function of the present poses, so it is computed when it is read, in a fork, a replay or a facet too, and takes
-//! no part in the state. The noise of a frame's image is that of its seed and of the number of the frame.
+//! no part in the state. The noise of a frame's image is that of its seed and of the number of the frame; the walk of its bias
+//! is a number of the state, one for the whole image. A camera with a delay makes its image at the end of every frame and keeps
+//! those of the last frames in the state, a number per pixel.
 //!
 //! | symbol | meaning |
 //! |---|---|

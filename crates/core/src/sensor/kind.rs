@@ -130,9 +130,9 @@ impl SensorKind {
         matches!(self, Depth | Segmentation | Color)
     }
 
-    /// Returns whether it reads distances, to which noise can be added, or numbers: an image of parts or colors has none.
+    /// Returns whether it reads numbers to which noise can be added: an image of parts has none.
     pub fn has_noise(self) -> bool {
-        !matches!(self, Segmentation | Color)
+        self != Segmentation
     }
 
     /// Returns whether it may have a reference.

@@ -31,13 +31,16 @@ pub use noise::SensorNoise;
 
 use crate::constraint::loop_joint::Anchor;
 use crate::object::frame_state::{Frame, FrameImpulse};
+use crate::object::net_sync::{read_state, write_state};
 use crate::object::part_state::StateRange;
-use crate::object::{FrameState, Object};
-use crate::world::view::ObjectId;
+use crate::object::{FrameState, NetSync, Object, SyncError};
+use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Shape;
 
 /// Maximum delay of a reading, frames.
 pub const MAX_DELAY: u32 = 10_000;
+/// Maximum number of pixels that a camera keeps for its delay: pixels of an image times frames of the delay.
+pub const MAX_DELAYED_PIXELS: u64 = 1 << 22;
 
 /// An invalid constant of a sensor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -224,17 +227,30 @@ impl Sensor {
         if self.kind == SensorKind::Orientation && noise.quantization > 0.0 {
             return Err(self.wrong("an orientation has no quantization"));
         }
-        if self.kind.is_camera() && (noise.bias_walk > 0.0 || noise.delay > 0) {
-            return Err(self.wrong("an image has no walk of a bias and no delay"));
-        }
-        if !self.kind.has_noise() && noise != (SensorNoise { seed: noise.seed, ..SensorNoise::default() }) {
-            return Err(self.wrong(match self.kind {
-                SensorKind::Segmentation => "a segmentation has no noise",
-                _ => "an image of colors has no noise",
-            }));
+        let SensorNoise { delay, seed, .. } = noise;
+        if !self.kind.has_noise() && noise != (SensorNoise { delay, seed, ..SensorNoise::default() }) {
+            return Err(self.wrong("a segmentation has no noise: its numbers are names of parts; it may have a delay"));
         }
         self.noise = noise;
+        self.with_kept_images()
+    }
+
+    /// Checks that the images that a camera keeps for its delay are not too many.
+    fn with_kept_images(self) -> Result<Sensor, SensorError> {
+        let [width, height] = self.optics.resolution.map(u64::from);
+        let kept = width * height * u64::from(self.noise.delay);
+        if self.kind.is_camera() && kept > MAX_DELAYED_PIXELS {
+            let expected = "at most 4194304: a smaller resolution or a shorter delay";
+            let what = "the number of pixels that its delay keeps";
+            return Err(SensorError::Range { name: self.name, what, value: kept as f64, expected });
+        }
         Ok(self)
+    }
+
+    /// Returns the places of its numbers in its range of `X`.
+    pub(crate) fn layout(&self) -> noise::Layout {
+        let [width, height] = self.optics.resolution.map(|n| n as usize);
+        self.noise.layout(self.kind, width * height)
     }
 
     /// Sets resolution and angle of view of a camera.
@@ -249,7 +265,7 @@ impl Sensor {
             return Err(SensorError::Range { name: self.name, what, value, expected });
         }
         self.optics = optics;
-        Ok(self)
+        self.with_kept_images()
     }
 
     fn wrong(&self, why: &'static str) -> SensorError {
@@ -300,15 +316,30 @@ impl Object for Sensor {
     fn frame_state(&self) -> Option<&dyn FrameState> {
         Some(self)
     }
+
+    /// All its numbers are sent: a facet reads what the server reads, to the bit.
+    fn net_sync(&self) -> Option<&dyn NetSync> {
+        (self.len() > 0).then_some(self as &dyn NetSync)
+    }
+}
+
+impl NetSync for Sensor {
+    fn get_data(&self, me: &StateRange, view: &WorldView, out: &mut Vec<u8>) {
+        write_state(&view.x[me.x.clone()], out);
+    }
+
+    fn read_data(&self, data: &[u8], x: &mut [f64]) -> Result<(), SyncError> {
+        read_state(data, x, |x| self.accepts(x))
+    }
 }
 
 impl FrameState for Sensor {
     fn len(&self) -> usize {
-        self.noise.layout(self.kind).len()
+        self.layout().len()
     }
 
     fn accepts(&self, x: &[f64]) -> bool {
-        x.iter().all(|x| x.is_finite()) && self.noise.layout(self.kind).generator_is_sound(x)
+        x.iter().all(|x| x.is_finite()) && self.layout().generator_is_sound(x)
     }
 
     /// Does nothing: the world takes all readings after the last impulse of the frame.

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tumble_collide::{Quat, Vec3};
 
-/// Errors of a sensor; none by default. An orientation is turned by a rotation vector, rad, about the axes of the site.
+/// Errors of a sensor; none by default. Each number of a reading has a bias of its own, and an image one for all its pixels. An orientation is turned by a rotation vector, rad, about the axes of the site.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SensorNoise {
     /// Standard deviation of white noise on every number of a reading, in its unit; at least 0.
@@ -48,37 +48,72 @@ impl SensorNoise {
         }
     }
 
-    pub(crate) fn layout(&self, kind: SensorKind) -> Layout {
-        let numbers = kind.numbers();
+    /// Returns whether readings have no error but their delay.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.deviation == 0.0 && self.bias_walk == 0.0 && self.quantization == 0.0
+    }
+
+    /// Returns the places of the numbers of a sensor. A camera with a delay keeps images of `pixels` numbers, and every camera
+    /// has one bias for the whole image.
+    pub(super) fn layout(&self, kind: SensorKind, pixels: usize) -> Layout {
+        let numbers = if kind.is_camera() && self.delay > 0 { pixels } else { kind.numbers() };
         let random = self.deviation > 0.0 || self.bias_walk > 0.0;
-        let errors = if kind == SensorKind::Orientation { 3 } else { numbers };
+        let errors = match kind {
+            SensorKind::Orientation => 3,
+            kind if kind.is_camera() => 1,
+            _ => numbers,
+        };
         let generator = numbers + if random { 2 } else { 0 };
         let bias = generator + if self.bias_walk > 0.0 { errors } else { 0 };
         Layout { numbers, errors, generator: numbers..generator, bias: generator..bias, delay: self.delay as usize }
     }
 
     /// Writes the first state of the generator of the sensor with this serial number.
-    pub(crate) fn start(&self, kind: SensorKind, serial: u32, x: &mut [f64]) {
-        let layout = self.layout(kind);
+    pub(crate) fn start(&self, layout: &Layout, serial: u32, x: &mut [f64]) {
         if !layout.generator.is_empty() {
             let mut stream = SplitMix64(u64::from(serial));
-            SplitMix64(self.seed ^ stream.next()).write(&mut x[layout.generator]);
+            SplitMix64(self.seed ^ stream.next()).write(&mut x[layout.generator.clone()]);
         }
     }
 
-    /// Returns the generator of a frame's image. The words in `x` do not change, so an image can be read any number
-    /// of times.
-    pub(crate) fn of_image(&self, kind: SensorKind, x: &[f64], frame: u64) -> Option<SplitMix64> {
-        let layout = self.layout(kind);
-        let words = x.get(layout.generator).filter(|words| words.len() == 2)?;
+    /// Returns the bias and the generator of a frame's image. The words in `x` do not change, so an image can be read any
+    /// number of times.
+    pub(crate) fn of_image(&self, layout: &Layout, x: &[f64], frame: u64) -> Option<(f64, SplitMix64)> {
+        let words = x.get(layout.generator.clone()).filter(|words| words.len() == 2)?;
         let mut stream = SplitMix64(frame);
-        Some(SplitMix64(SplitMix64::read(words).0 ^ stream.next()))
+        let bias = x.get(layout.bias.clone()).and_then(|bias| bias.first()).copied().unwrap_or(0.0);
+        Some((bias, SplitMix64(SplitMix64::read(words).0 ^ stream.next())))
+    }
+
+    /// Changes the bias of a camera's images at the end of a frame of `dt` seconds.
+    pub(crate) fn walk_image(&self, layout: &Layout, dt: f64, frame: u64, x: &mut [f64]) {
+        if layout.bias.is_empty() {
+            return;
+        }
+        let mut stream = SplitMix64(!frame); // another one than that of the pixels
+        let mut generator = SplitMix64(SplitMix64::read(&x[layout.generator.clone()]).0 ^ stream.next());
+        x[layout.bias.start] += self.bias_walk * dt.sqrt() * generator.normal();
+    }
+
+    /// Puts the present image of a camera with a delay at the end of its line, or in all places of it at its addition.
+    pub(crate) fn delay_image(&self, layout: &Layout, first: bool, present: &[f64], x: &mut [f64]) {
+        let numbers = layout.numbers;
+        if first {
+            x[..numbers].copy_from_slice(present);
+            x[layout.bias.end..].chunks_exact_mut(numbers).for_each(|late| late.copy_from_slice(present));
+            return;
+        }
+        let line = layout.bias.end;
+        x.copy_within(line..line + numbers, 0);
+        x.copy_within(line + numbers.., line);
+        let last = x.len() - numbers;
+        x[last..].copy_from_slice(present);
     }
 
     /// Writes a reading with its errors to the numbers `x` of the sensor, after a frame of `dt` seconds, or at its
     /// addition for `None`. `present` becomes what the sensor sees now, without the delay.
     pub(crate) fn write(&self, kind: SensorKind, dt: Option<f64>, cutoff: f64, present: &mut [f64], x: &mut [f64]) {
-        let layout = self.layout(kind);
+        let layout = self.layout(kind, 0);
         if !layout.generator.is_empty() {
             let mut generator = SplitMix64::read(&x[layout.generator.clone()]);
             let mut errors = [0.0; 4];
@@ -141,6 +176,11 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// Returns the length of a reading.
+    pub fn numbers(&self) -> usize {
+        self.numbers
+    }
+
     pub fn len(&self) -> usize {
         self.bias.end + self.delay * self.numbers
     }

@@ -106,6 +106,25 @@ impl World {
         Ok(())
     }
 
+    /// Sets or removes the intersection test of a link's own, or of one of its shapes, as
+    /// [`ArticulatedBody::set_intersect`] does, without waking it.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed or is no articulated body, and the errors of that function.
+    pub fn set_link_intersect(
+        &mut self,
+        id: ObjectId,
+        link: &str,
+        shape: Option<usize>,
+        test: Option<Arc<dyn Intersect>>,
+    ) -> Result<(), WorldError> {
+        let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
+        self.core.table.walk.unsettle(place);
+        let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();
+        let body = object.downcast_mut::<ArticulatedBody>().ok_or(WorldError::Stale)?;
+        Ok(body.set_intersect(link, shape, test)?)
+    }
+
     /// Wakes an object and returns its settings for a change.
     fn status_mut(&mut self, id: ObjectId) -> Result<&mut Status, WorldError> {
         self.core.wake(id);

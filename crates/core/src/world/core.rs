@@ -114,6 +114,14 @@ pub enum StepError {
         /// The fault.
         why: super::WorldError,
     },
+    /// A callback of a scripted event returned an error.
+    #[error("the callback of event '{event}': {why}")]
+    Callback {
+        /// Name of the event.
+        event: String,
+        /// Its text.
+        why: String,
+    },
     /// A constraint made an invalid row.
     #[error("constraint '{object}': {why}")]
     Row {
@@ -201,6 +209,8 @@ pub struct Core {
     pub(crate) broken: Vec<u32>,
     /// Events of the last frame.
     pub(crate) events: Vec<Event>,
+    /// Cameras whose images of the frame are in the state, or whose bias walks.
+    pub(crate) cameras: Vec<ObjectId>,
     pub(crate) report: StepReport,
     /// Work of the frame, and its budget.
     pub(crate) meter: WorkMeter,
@@ -266,6 +276,7 @@ impl Core {
             loads: FrameLoads::default(),
             broken: Vec::new(),
             events: Vec::new(),
+            cameras: Vec::new(),
             report: StepReport::default(),
             meter: WorkMeter::default(),
             needs_wake: Vec::new(),
@@ -283,6 +294,7 @@ impl Core {
             pair_materials: self.pair_materials.clone(),
             contacts: self.contacts.clone(),
             events: self.events.clone(),
+            cameras: Vec::new(),
             report: self.report,
             ..Core::new(self.table.clone(), self.settings, self.solver.fork(), self.state.clone())
         };

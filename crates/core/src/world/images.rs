@@ -32,47 +32,130 @@ impl World {
     /// not see.
     pub fn depth_image(&self, id: ObjectId) -> Option<SensorImage<f64>> {
         let sensor = self.get::<Sensor>(id).filter(|sensor| sensor.kind() == SensorKind::Depth)?;
-        let noise = *sensor.noise();
-        let mut generator = noise.of_image(sensor.kind(), self.state_of(id)?, self.core.state.frame);
+        match self.late(id, sensor) {
+            Some(late) => late,
+            None => self.present_depth(id, sensor),
+        }
+    }
+
+    fn present_depth(&self, id: ObjectId, sensor: &Sensor) -> Option<SensorImage<f64>> {
+        let mut error = self.image_error(id, sensor);
         let depth = |hit: Option<(RayCastHit, f64)>| {
-            let error = generator.as_mut().map_or(0.0, |generator| noise.deviation * generator.normal());
+            let error = error();
             let Some((hit, per_meter)) = hit else { return -1.0 };
-            let seen = (hit.distance * per_meter + error).max(0.0);
-            if noise.quantization > 0.0 { noise.quantization * (seen / noise.quantization).round() } else { seen }
+            quantized((hit.distance * per_meter + error).max(0.0), sensor.noise().quantization)
         };
         Some(self.image(sensor)?.map(depth))
+    }
+
+    /// Returns a function that gives the error of one number of the present image after the other.
+    fn image_error(&self, id: ObjectId, sensor: &Sensor) -> impl FnMut() -> f64 + use<> {
+        let noise = *sensor.noise();
+        let x = self.state_of(id).unwrap_or_default();
+        let mut found = noise.of_image(&sensor.layout(), x, self.core.state.frame);
+        move || found.as_mut().map_or(0.0, |(bias, generator)| *bias + noise.deviation * generator.normal())
     }
 
     /// Returns the image of a segmentation camera in the present poses: the object and part behind each pixel, as
     /// [`depth_image`](Self::depth_image) sees them.
     pub fn segmentation_image(&self, id: ObjectId) -> Option<SensorImage<Option<(ObjectId, usize)>>> {
         let sensor = self.get::<Sensor>(id).filter(|sensor| sensor.kind() == SensorKind::Segmentation)?;
+        match self.late(id, sensor) {
+            Some(late) => Some(late?.map(|number| self.core.part_of_number(number))),
+            None => self.present_parts(sensor),
+        }
+    }
+
+    fn present_parts(&self, sensor: &Sensor) -> Option<SensorImage<Option<(ObjectId, usize)>>> {
         Some(self.image(sensor)?.map(|hit| hit.map(|(hit, _)| (hit.id, hit.part))))
     }
 
     /// Returns the image of a color camera in the present poses: sRGB, 0 to 255; black where nothing is within the cutoff.
     ///
     /// It sees what [`depth_image`](Self::depth_image) sees, in the base color of its visual, by a light in the camera: no
-    /// lights of the scene, no shadows, patterns and textures. What has no visual has the default color.
+    /// lights of the scene, no shadows, patterns and textures. What has no visual has the default color. Its noise is added to
+    /// the values of 0 to 255.
     pub fn color_image(&self, id: ObjectId) -> Option<SensorImage<[u8; 3]>> {
         let sensor = self.get::<Sensor>(id).filter(|sensor| sensor.kind() == SensorKind::Color)?;
+        match self.late(id, sensor) {
+            Some(late) => Some(late?.map(|number| {
+                let [.., red, green, blue] = (number as u32).to_be_bytes();
+                [red, green, blue]
+            })),
+            None => self.present_colors(id, sensor),
+        }
+    }
+
+    fn present_colors(&self, id: ObjectId, sensor: &Sensor) -> Option<SensorImage<[u8; 3]>> {
+        let noise = *sensor.noise();
+        let mut error = self.image_error(id, sensor);
+        let mut with_errors = |seen: [u8; 3]| match noise.is_exact() {
+            true => seen,
+            false => {
+                seen.map(|c| quantized(f64::from(c) + error(), noise.quantization).round().clamp(0.0, 255.0) as u8)
+            }
+        };
         let SensorPlace::Site(site) = sensor.place() else { return None };
         let pose = self.core.site_pose(site)?;
         let SensorImage { width, height, pixels } = self.image(sensor)?;
         let looks = self.looks();
         let mut palette: BTreeMap<(ObjectId, usize), Vec<&Visual>> = BTreeMap::new();
         let color = |(hit, direction): (Option<(RayCastHit, f64)>, Vec3)| {
-            let Some((hit, per_meter)) = hit else { return [0; 3] };
+            let Some((hit, per_meter)) = hit else { return with_errors([0; 3]) };
             let direction = pose.rotation * direction * per_meter;
             let visuals = palette.entry((hit.id, hit.part)).or_insert_with(|| self.core.visuals_of(hit.id, hit.part));
             let seen = self.core.seen(visuals, &hit, &pose.translation.vector, &direction);
             let light = AMBIENT + (1.0 - AMBIENT) * (-hit.normal.dot(&direction)).max(0.0);
             let own = seen.map_or(Appearance::default().color, |visual| visual.appearance.color);
             let base = looks.colors.get(&hit.id).copied().unwrap_or(own);
-            base.map(|c| encoded(light * decoded(f64::from(c))))
+            with_errors(base.map(|c| encoded(light * decoded(f64::from(c)))))
         };
         let pixels = pixels.into_iter().zip(sensor.optics().directions()).map(color).collect();
         Some(SensorImage { width, height, pixels })
+    }
+
+    /// Returns the image that a camera with a delay shows now, as numbers; `None` for a camera without one, and `None` in it if
+    /// the body of the camera was removed.
+    fn late(&self, id: ObjectId, sensor: &Sensor) -> Option<Option<SensorImage<f64>>> {
+        let SensorPlace::Site(site) = sensor.place() else { return Some(None) };
+        (sensor.noise().delay > 0).then(|| {
+            self.core.site_pose(site)?;
+            let pixels = self.state_of(id)?.get(..sensor.layout().numbers())?.to_vec();
+            let [width, height] = sensor.optics().resolution.map(|n| n as usize);
+            Some(SensorImage { width, height, pixels })
+        })
+    }
+
+    /// Takes the images of cameras with a delay at the end of a frame, and moves the biases of cameras.
+    pub(super) fn take_images(&mut self) {
+        for id in std::mem::take(&mut self.core.cameras) {
+            self.take_image(id, Some(self.core.settings.dt));
+        }
+    }
+
+    /// Takes the image of a camera after a frame of `dt` seconds, or at its addition for `None`.
+    pub(super) fn take_image(&mut self, id: ObjectId, dt: Option<f64>) {
+        let Some(sensor) = self.get::<Sensor>(id) else { return };
+        let (noise, layout, kind) = (*sensor.noise(), sensor.layout(), sensor.kind());
+        let Some(range) = self.view().state_range(id).map(|span| span.x.clone()) else { return };
+        if let Some(dt) = dt {
+            noise.walk_image(&layout, dt, self.core.state.frame, &mut self.core.state.x[range.clone()]);
+        }
+        if noise.delay == 0 {
+            return;
+        }
+        let Some(sensor) = self.get::<Sensor>(id) else { return };
+        let number = |part: Option<(ObjectId, usize)>| part.map_or(-1.0, |part| self.core.number_of_part(part));
+        let present = match kind {
+            SensorKind::Segmentation => self.present_parts(sensor).map(|image| image.map(number)),
+            SensorKind::Color => self
+                .present_colors(id, sensor)
+                .map(|image| image.map(|[r, g, b]| f64::from(u32::from_be_bytes([0, r, g, b])))),
+            _ => self.present_depth(id, sensor),
+        };
+        if let Some(present) = present {
+            noise.delay_image(&layout, dt.is_none(), &present.pixels, &mut self.core.state.x[range]);
+        }
     }
 
     /// Returns the hit behind each pixel, with the depth per meter of the ray.
@@ -96,6 +179,13 @@ impl World {
     }
 }
 
+fn quantized(value: f64, step: f64) -> f64 {
+    if step > 0.0 { step * (value / step).round() } else { value }
+}
+
+/// Number of parts of an object that a late segmentation distinguishes.
+const PARTS: f64 = 2_097_152.0;
+
 /// Light from all sides, of a surface that faces the camera.
 const AMBIENT: f64 = 0.25;
 
@@ -115,6 +205,19 @@ fn encoded(light: f64) -> u8 {
 }
 
 impl Core {
+    /// Returns a part as a number of the state: the serial number of its object, times 2²¹, plus its own.
+    fn number_of_part(&self, (id, part): (ObjectId, usize)) -> f64 {
+        let serial = self.table.place(id).map(|place| self.state.objects[place].serial);
+        serial.map_or(-1.0, |serial| f64::from(serial) * PARTS + part as f64)
+    }
+
+    /// Returns the part of such a number; `None` for −1, and if its object was removed.
+    fn part_of_number(&self, number: f64) -> Option<(ObjectId, usize)> {
+        let serial = (number >= 0.0).then(|| (number / PARTS).floor())?;
+        let place = self.by_serial(serial as u32)?;
+        Some((self.table.order[place], (number - serial * PARTS) as usize))
+    }
+
     /// Returns the visuals that move with a part.
     fn visuals_of(&self, id: ObjectId, part: usize) -> Vec<&Visual> {
         let visuals = self.objects().get(id).and_then(|entry| entry.object.renderable()).map(|r| r.visuals());

@@ -238,6 +238,7 @@ impl World {
             core.report = report_before;
             return Err(error);
         }
+        self.take_images();
         Ok(&self.core.report)
     }
 

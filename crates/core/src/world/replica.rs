@@ -1,5 +1,6 @@
 //! A world that shows the simulation of another process (thesis §IV.A.6). Nothing here steps.
 
+use super::events::Event;
 use super::{ContactPoint, World, WorldError};
 use crate::object::SyncError;
 use crate::object::part_state::PartState;
@@ -91,5 +92,14 @@ impl Replica<'_> {
         core.contacts.clear();
         let present = |c: &ContactPoint| core.table.place(c.a).is_some() && core.table.place(c.b).is_some();
         core.contacts.extend(contacts.into_iter().filter(present));
+    }
+
+    /// Shows events as those of the last step. Events of objects that are not in the world are left out.
+    pub fn set_events(&mut self, events: impl IntoIterator<Item = Event>) {
+        let core = &mut self.0.core;
+        core.events.clear();
+        let table = &core.table;
+        let present = |e: &Event| table.place(e.a).is_some() && e.b.is_none_or(|b| table.place(b).is_some());
+        core.events.extend(events.into_iter().filter(present));
     }
 }

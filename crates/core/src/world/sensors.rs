@@ -38,9 +38,9 @@ impl World {
         let any: &dyn std::any::Any = entry.object;
         let why = || WorldError::Sensor { name: entry.name.to_string(), why: "it is no measuring sensor".into() };
         let sensor = any.downcast_ref::<Sensor>().ok_or_else(why)?;
-        let (noise, kind) = (crate::SensorNoise { seed, ..*sensor.noise() }, sensor.kind());
+        let (noise, layout) = (crate::SensorNoise { seed, ..*sensor.noise() }, sensor.layout());
         let (serial, range) = (entry.serial, entry.state_range.x.clone());
-        noise.start(kind, serial, &mut self.core.state.x[range]);
+        noise.start(&layout, serial, &mut self.core.state.x[range]);
         Ok(())
     }
 
@@ -99,12 +99,14 @@ impl World {
         let Some(sensor) = any.downcast_ref::<Sensor>() else { return };
         let (noise, kind, cutoff) = (*sensor.noise(), sensor.kind(), sensor.cutoff());
         let (serial, range) = (entry.serial, entry.state_range.x.clone());
+        let layout = sensor.layout();
         if kind.is_camera() {
-            return noise.start(kind, serial, &mut self.core.state.x[range]);
+            noise.start(&layout, serial, &mut self.core.state.x[range]);
+            return self.take_image(id, None);
         }
         let Some(mut reading) = sensor.measure(&self.core, None) else { return };
         let x = &mut self.core.state.x[range];
-        noise.start(kind, serial, x);
+        noise.start(&layout, serial, x);
         noise.write(kind, None, cutoff, &mut reading, x);
     }
 }
@@ -113,11 +115,18 @@ impl Core {
     /// Takes the readings of all sensors after a frame that began with the part states `before`.
     pub(super) fn read_sensors(&mut self, before: &[PartState]) -> Result<(), StepError> {
         let dt = self.settings.dt;
+        self.cameras.clear();
         for walked in 0..self.table.walk.places.len() {
             let place = self.table.walk.places[walked] as usize;
             let entry = self.objects().at(place);
             let any: &dyn std::any::Any = entry.object;
             let Some(sensor) = any.downcast_ref::<Sensor>().filter(|_| entry.status.enabled) else { continue };
+            if sensor.kind().is_camera() {
+                if sensor.noise().delay > 0 || sensor.noise().bias_walk > 0.0 {
+                    self.cameras.push(self.table.order[place]);
+                }
+                continue;
+            }
             if sensor.kind().needs_loads() && self.sleeps_under(sensor) {
                 continue;
             }

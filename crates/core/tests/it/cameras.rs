@@ -7,7 +7,7 @@ use tumble_core::collide::{Pose, Shape, TreeSettings, TriMesh, Vec3};
 use tumble_core::*;
 
 /// A camera one meter above the ground that looks down: x of the image along x, y along −y.
-fn down(height: f64) -> Pose {
+pub fn down(height: f64) -> Pose {
     Pose::new(Vec3::new(0.0, 0.0, height), Vec3::x() * PI)
 }
 
@@ -227,12 +227,19 @@ fn constants_of_cameras_out_of_range_are_refused() {
         let why = depth().with_optics(optics).unwrap_err().to_string();
         assert!(why.contains(what), "{why}");
     }
-    let noise = |noise: SensorNoise| depth().with_noise(noise).unwrap_err().to_string();
-    assert!(noise(SensorNoise { delay: 2, ..SensorNoise::default() }).contains("no delay"));
-    assert!(noise(SensorNoise { bias_walk: 0.1, ..SensorNoise::default() }).contains("walk"));
     let gyro = Sensor::new("gyro", SensorKind::Gyroscope, Anchor::world(Pose::identity())).unwrap();
     assert!(gyro.with_optics(Optics::default()).unwrap_err().to_string().contains("only cameras"));
     let parts = Sensor::new("parts", SensorKind::Segmentation, Anchor::world(Pose::identity())).unwrap();
-    let noisy = parts.with_noise(SensorNoise { deviation: 0.1, ..SensorNoise::default() });
-    assert!(noisy.unwrap_err().to_string().contains("segmentation has no noise"));
+    let (deviation, bias_walk, quantization) = (0.1, 0.1, 0.1);
+    for noise in [
+        SensorNoise { deviation, ..SensorNoise::default() },
+        SensorNoise { bias_walk, ..SensorNoise::default() },
+        SensorNoise { quantization, delay: 2, ..SensorNoise::default() },
+    ] {
+        let why = parts.clone().with_noise(noise).unwrap_err().to_string();
+        assert!(why.contains("a segmentation has no noise") && why.contains("it may have a delay"), "{why}");
+    }
+    assert!(parts.with_noise(SensorNoise { delay: 2, ..SensorNoise::default() }).is_ok());
+    let noisy = depth().with_noise(SensorNoise { bias_walk: -1.0, ..SensorNoise::default() });
+    assert!(noisy.unwrap_err().to_string().contains("the walk of the bias"));
 }

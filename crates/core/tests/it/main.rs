@@ -26,6 +26,8 @@ mod assemblies;
 mod ball_joints;
 mod body_constants;
 mod budget;
+mod callbacks;
+mod camera_noise;
 mod cameras;
 mod chains;
 mod common;

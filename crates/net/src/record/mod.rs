@@ -31,6 +31,7 @@
 //! | [`TOPIC_STATE`] | `tumble.State` | every frame: frame number, exact time and the caller's state bytes and contacts |
 //! | [`TOPIC_SURFACES`] | `foxglove.SceneUpdate` | every frame of a world with cloth or jelly: its surfaces |
 //! | [`TOPIC_PARTICLES`] | `foxglove.PointCloud` | every frame of a world with particles: at most [`MAX_POINTS`] of them |
+//! | [`TOPIC_CAMERAS`] and a name | `foxglove.RawImage` | every frame for which [`Recorder::images`] was called: the image of a camera |
 //!
 //! All are protobuf, with their schemas in the file. The metadata of the state channel also
 //! contains the text of `tumble.State`, under `proto`. A metadata record named `tumble` contains
@@ -64,6 +65,7 @@ mod chunk;
 mod container;
 mod deforming;
 mod error;
+mod images;
 #[cfg(feature = "live")]
 pub mod live;
 mod messages;
@@ -78,6 +80,7 @@ pub use chain::{ChainHash, chain_hash};
 pub use container::Ending;
 pub use deforming::{Deforming, MAX_POINTS, Point, Surface};
 pub use error::RecordError;
+pub use images::{Images, MAX_CAMERAS, Pixels, RecordedImage, TOPIC_CAMERAS};
 pub use reader::{Frame, Reader, is_recording, read};
 pub use recover::{RecoverReport, recover};
 pub use report::{MAX_EVENTS, Readings, RecordedEvent, TOPIC_EVENTS, TOPIC_SENSORS};

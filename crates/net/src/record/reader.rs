@@ -6,6 +6,7 @@ use super::chain::{ChainHash, chain_hash};
 use super::chunk::{Channel, Inner, Schema, define, next_inner, open_chunk, parse_inner};
 use super::container::{Container, Ending, Next, RawRecord};
 use super::error::{RecordError, Result};
+use super::images::{IMAGE_SCHEMA, Images, TOPIC_CAMERAS, decode_image};
 use super::messages::{entities_of, nanoseconds, poses_of};
 use super::report::{
     EVENTS_SCHEMA, JSON, Readings, RecordedEvent, SENSORS_SCHEMA, TOPIC_EVENTS, TOPIC_SENSORS, decode_events,
@@ -40,6 +41,17 @@ pub struct Frame {
     pub sensors: Readings,
     /// Events of the frame.
     pub events: Vec<RecordedEvent>,
+    /// Images of cameras by their names, if they were recorded.
+    pub images: Images,
+}
+
+/// Readings, events and images of the frame at a log time, whose state comes next.
+#[derive(Debug, Default)]
+struct Report {
+    log_time: u64,
+    sensors: Readings,
+    events: Vec<RecordedEvent>,
+    images: Images,
 }
 
 /// Opens a recording, complete or cut, and reads up to its first scene.
@@ -117,8 +129,8 @@ pub struct Reader {
     chunk_offset: u64,
     /// Poses of the frame whose state comes next, with their log time.
     poses: Option<(u64, Vec<Pose>)>,
-    /// Readings and events of the frame whose state comes next, with their log time.
-    report: Option<(u64, Readings, Vec<RecordedEvent>)>,
+    /// Readings, events and images of the frame whose state comes next.
+    report: Option<Report>,
     /// A frame that was read before the first scene.
     ahead: Option<Frame>,
     last_frame: Option<u64>,
@@ -271,6 +283,7 @@ impl Reader {
             TOPIC_STATE => STATE_SCHEMA,
             TOPIC_SENSORS => SENSORS_SCHEMA,
             TOPIC_EVENTS => EVENTS_SCHEMA,
+            topic if topic.starts_with(TOPIC_CAMERAS) => IMAGE_SCHEMA,
             _ => return Ok(None),
         };
         let schema = self.schemas.get(&info.schema).map_or("", |schema| schema.name.as_str());
@@ -285,21 +298,27 @@ impl Reader {
             SCENE_SCHEMA => self.scene(data).map(|()| Some(Event::Scene)),
             TRANSFORMS_SCHEMA => self.transforms(log_time, data).map(|()| None),
             SENSORS_SCHEMA => decode_readings(data).map(|sensors| {
-                self.report_at(log_time).1 = sensors;
+                self.report_at(log_time).sensors = sensors;
                 None
             }),
             EVENTS_SCHEMA => decode_events(data).map(|events| {
-                self.report_at(log_time).2 = events;
+                self.report_at(log_time).events = events;
                 None
             }),
+            IMAGE_SCHEMA => {
+                let name = info.topic[TOPIC_CAMERAS.len()..].to_owned();
+                let image = decode_image(&name, data)?;
+                self.report_at(log_time).images.insert(name, image);
+                Ok(None)
+            }
             _ => self.state(log_time, data).map(|frame| Some(Event::Frame(frame))),
         }
     }
 
-    /// Returns the readings and events of the frame at a log time.
-    fn report_at(&mut self, log_time: u64) -> &mut (u64, Readings, Vec<RecordedEvent>) {
-        self.report = self.report.take().filter(|(at, ..)| *at == log_time);
-        self.report.get_or_insert_with(|| (log_time, Readings::new(), Vec::new()))
+    /// Returns the readings, events and images of the frame at a log time.
+    fn report_at(&mut self, log_time: u64) -> &mut Report {
+        self.report = self.report.take().filter(|report| report.log_time == log_time);
+        self.report.get_or_insert_with(|| Report { log_time, ..Report::default() })
     }
 
     fn scene(&mut self, data: &[u8]) -> std::result::Result<(), String> {
@@ -366,9 +385,9 @@ impl Reader {
             self.broken_at = self.broken_at.or(Some(frame));
         }
         self.chain = chain.try_into().ok();
-        let report = self.report.take().filter(|(at, ..)| *at == log_time);
-        let (sensors, events) = report.map(|(_, sensors, events)| (sensors, events)).unwrap_or_default();
-        Ok(Frame { time_s, frame, poses, contacts, state: payload, sensors, events })
+        let report = self.report.take().filter(|report| report.log_time == log_time);
+        let Report { sensors, events, images, .. } = report.unwrap_or_default();
+        Ok(Frame { time_s, frame, poses, contacts, state: payload, sensors, events, images })
     }
 }
 

@@ -4,12 +4,13 @@ use super::budget;
 use super::chain::{ChainHash, chain_hash};
 use super::deforming::Deforming;
 use super::error::{RecordError, Result};
+use super::images::{ImageChannels, Images, encode_image, image_message};
 use super::messages::{nanoseconds, scene_update, set_transforms, transforms_for};
 use super::report::{Readings, RecordedEvent, ReportChannels, encode_events, encode_readings};
 use super::scene::{Contact, Entity, Pose, check_entities, encode_contacts};
 use super::schemas::{Channels, METADATA_NAME, State, VERSION, add_channels};
 use super::{MAX_CONTACTS, MAX_NAME_BYTES, MAX_SCENE_BYTES, MAX_STATE_BYTES, MAX_TIME_S};
-use foxglove::messages::FrameTransforms;
+use foxglove::messages::{FrameTransforms, RawImage};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{WriteOptions, Writer};
@@ -137,6 +138,9 @@ pub struct Recorder {
     chain: Option<ChainHash>,
     /// Messages of sensors and events that the next frame writes.
     report: [Option<Vec<u8>>; 2],
+    image_channels: ImageChannels,
+    /// Images that the next frame writes, by their cameras.
+    images: Vec<(String, RawImage)>,
 }
 
 impl Recorder {
@@ -183,6 +187,8 @@ impl Recorder {
             chain: None,
             report_channels: ReportChannels::default(),
             report: [None, None],
+            image_channels: ImageChannels::default(),
+            images: Vec::new(),
         };
         recorder.write_scene(0.0, entities)?;
         Ok(recorder)
@@ -209,6 +215,18 @@ impl Recorder {
         let sensors = (!sensors.is_empty()).then(|| encode_readings(sensors)).transpose().map_err(refuse)?;
         let events = (!events.is_empty()).then(|| encode_events(events)).transpose().map_err(refuse)?;
         self.report = [sensors, events];
+        Ok(())
+    }
+
+    /// Gives the next frame images of cameras. Without any it has none.
+    ///
+    /// # Errors
+    /// [`RecordError`] for an image whose pixels are not as many as its size says or are not finite, long names, more than
+    /// [`MAX_STATE_BYTES`] bytes, and more than [`MAX_CAMERAS`](super::MAX_CAMERAS) cameras.
+    pub fn images(&mut self, images: &Images) -> Result<()> {
+        let refuse = |why: String| RecordError::input("a frame", why);
+        let one = |(name, image): (&String, _)| Ok((name.clone(), encode_image(name, image)?));
+        self.images = images.iter().map(one).collect::<std::result::Result<_, String>>().map_err(refuse)?;
         Ok(())
     }
 
@@ -240,6 +258,10 @@ impl Recorder {
         if let Some(message) = events {
             let channel = self.report_channels.events(&mut self.writer, &self.path)?;
             self.write(channel, sequence, log_time, &message)?;
+        }
+        for (name, image) in std::mem::take(&mut self.images) {
+            let channel = self.image_channels.of(&name, &mut self.writer, &self.path)?;
+            self.write(channel, sequence, log_time, &image_message(image, log_time))?;
         }
         let chain = chain_hash(self.chain.as_ref(), frame, time_s, state);
         self.chain = Some(chain);

@@ -41,23 +41,20 @@ pub(crate) fn put_contacts<'a>(
 /// # Errors
 /// [`MessageError::Malformed`].
 pub(crate) fn get_contacts(
-    bytes: &[u8],
+    rest: &mut ByteReader<'_>,
     ids: &[Option<ObjectId>],
     world: &World,
 ) -> Result<Vec<ContactPoint>, MessageError> {
-    let mut rest = ByteReader(bytes);
     let count = rest.u32()? as usize;
     if count > MAX_CONTACTS {
         return Err(MessageError::Malformed("more than 256 contacts"));
     }
     let mut contacts = Vec::with_capacity(count);
     for _ in 0..count {
-        let sides = [side(&mut rest, ids, world)?, side(&mut rest, ids, world)?];
-        let (point, normal, depth, force) =
-            (vector(&mut rest)?, vector(&mut rest)?, number(&mut rest)?, vector(&mut rest)?);
+        let sides = [side(rest, ids, world)?, side(rest, ids, world)?];
+        let (point, normal, depth, force) = (vector(rest)?, vector(rest)?, number(rest)?, vector(rest)?);
         contacts.push(ContactPoint::shown(sides, point, normal, depth, force));
     }
-    rest.end()?;
     Ok(contacts)
 }
 

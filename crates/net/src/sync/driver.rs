@@ -88,6 +88,12 @@ impl<L: ServerLink> Server<L> {
         Ok(frame)
     }
 
+    /// Takes the events of the world's last step into the next frame: call it after each step of a frame with several, if
+    /// [`ServerOptions::events`] is above 0.
+    pub fn step(&mut self, world: &World) {
+        self.session.step(world);
+    }
+
     /// Sends everything that acts on the world in the next frame to the facets that step by
     /// themselves. [`begin_simulation`](Self::begin_simulation) of that frame follows.
     ///

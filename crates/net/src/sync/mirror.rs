@@ -3,6 +3,7 @@
 
 use super::cloud::{get_cloud, put_cloud};
 use super::contacts::{get_contacts, put_contacts};
+use super::events::{get_events, put_events};
 use super::frame_hash::FrameHasher;
 use super::publisher::put_message;
 use super::quantize::get_pose;
@@ -10,7 +11,7 @@ use super::render_proxy::RenderProxy;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
 use super::viewer::{VIEWER_NAME, Viewer};
 use super::visuals::get_looks;
-use super::wire::{Hash, MessageError};
+use super::wire::{ByteReader, Hash, MessageError};
 use std::collections::BTreeSet;
 use tumble_collide::Pose;
 use tumble_core::{Mode, ObjectId, World};
@@ -199,7 +200,10 @@ impl Mirror {
                 }
             }
         }
-        let contacts = get_contacts(records.rest(), &self.ids, &self.world)?;
+        let mut rest = ByteReader(records.rest());
+        let contacts = get_contacts(&mut rest, &self.ids, &self.world)?;
+        let events = get_events(&mut rest, &self.ids, &self.world)?;
+        rest.end()?;
         let viewer = viewer.ok_or(MessageError::Malformed("no viewer"))?;
         self.apply_messages(&messages)?;
         for (id, spheres) in clouds {
@@ -219,6 +223,7 @@ impl Mirror {
         }
         self.world.replica().set_time(time_s);
         self.world.replica().set_contacts(contacts);
+        self.world.replica().set_events(events);
         (self.viewer, self.frame, self.poses) = (viewer, frame, poses);
         Ok(())
     }
@@ -256,10 +261,11 @@ impl Mirror {
                 self.hash_object(id, slot, &mut hasher);
             }
         }
-        let shown = self.world.contacts();
-        let ids = self.ids.iter().zip(0..).filter(|_| !shown.is_empty());
+        let (shown, events) = (self.world.contacts(), self.world.events());
+        let ids = self.ids.iter().zip(0..).filter(|_| !shown.is_empty() || !events.is_empty());
         let indices = ids.filter_map(|(id, index)| Some(((*id)?, index))).collect();
         hasher.bytes(|out| put_contacts(out, shown, &indices));
+        hasher.bytes(|out| put_events(out, events, &indices, &self.world));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         hash

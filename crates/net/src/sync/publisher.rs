@@ -3,6 +3,7 @@
 
 use super::cloud::{cloud_of, put_cloud};
 use super::contacts::{MAX_CONTACTS, put_contacts};
+use super::events::{MAX_FRAME_EVENTS, StepEvents, put_events};
 use super::frame_hash::FrameHasher;
 use super::quantize::{get_pose, put_pose};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
@@ -14,7 +15,7 @@ use crate::world::strongest;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tumble_collide::Pose;
-use tumble_core::{Mode, ObjectId, World};
+use tumble_core::{Event, Mode, ObjectId, World};
 
 /// Error of a world that cannot be sent.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -75,6 +76,9 @@ pub struct Publisher {
     exact: bool,
     /// Largest number of contacts in a frame.
     contacts: usize,
+    /// Largest number of events in a frame, and those of the steps since the last one.
+    events: usize,
+    steps: StepEvents,
     base: World,
     /// Objects of the world at the last rebuild of the table.
     ids: Vec<ObjectId>,
@@ -94,6 +98,8 @@ impl Publisher {
         Publisher {
             exact,
             contacts: 0,
+            events: 0,
+            steps: StepEvents::default(),
             base: base.fork(),
             ids: Vec::new(),
             rows: Vec::new(),
@@ -111,6 +117,53 @@ impl Publisher {
     pub fn with_contacts(mut self, max: usize) -> Publisher {
         self.contacts = max.min(MAX_CONTACTS);
         self
+    }
+
+    /// Sends the events of the steps of every frame, at most `max` and [`MAX_FRAME_EVENTS`]. If there are more, contacts that
+    /// persist are left out first, those with the smallest impulses. By default there are none.
+    ///
+    /// ```
+    /// use tumble_core::prelude::*;
+    /// use tumble_core::{Anchor, EventKind, Sensor, SensorKind};
+    /// use tumble_net::sync::{MAX_FRAME_EVENTS, Mirror, Publisher, Viewer};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut world = World::default();
+    /// world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground"))?;
+    /// let ball = RigidBody::new(Shape::sphere(0.1)?).with_name("ball").with_mass(2.0);
+    /// let ball = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 0.2)))?;
+    /// world.add(Sensor::new("felt", SensorKind::Touch, Anchor::on(ball, 0, Pose::identity()))?)?;
+    /// let base = world.fork(); // a facet reads the same scene
+    /// let mut publisher = Publisher::new(&world, false, 0).with_events(MAX_FRAME_EVENTS);
+    /// let mut mirror = Mirror::new(base);
+    /// while world.events().is_empty() {
+    ///     world.step()?;
+    /// }
+    /// let published = publisher.publish(&world, &Viewer::default(), 1)?;
+    /// mirror.apply_snapshot(&publisher.snapshot())?;
+    /// mirror.apply_state(1, world.time(), &published.state)?;
+    /// let (shown, felt) = (mirror.world(), mirror.world().find("felt").unwrap());
+    /// assert_eq!(shown.events()[0].kind, EventKind::ContactBegin);
+    /// assert_eq!(shown.reading(felt), world.reading(felt));
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn with_events(mut self, max: usize) -> Publisher {
+        self.events = max.min(MAX_FRAME_EVENTS);
+        self
+    }
+
+    /// Takes the events of the world's last step into the next frame. A program that makes several steps a frame calls it
+    /// after each; [`publish`](Self::publish) does it for the last one. Does nothing without [`with_events`](Self::with_events).
+    pub fn step(&mut self, world: &World) {
+        if self.events > 0 {
+            self.steps.step(world, self.events);
+        }
+    }
+
+    /// Leaves out a frame with its events.
+    pub(super) fn skip(&mut self) {
+        self.steps.take();
     }
 
     /// Returns the SNAPSHOT payload of the last [`publish`](Self::publish); empty before the first.
@@ -148,11 +201,20 @@ impl Publisher {
         put_record(&mut state, self.rows.len(), |out| viewer.write(out));
         let start = state.len();
         put_contacts(&mut state, strongest(world, self.contacts), &self.indices);
+        self.step(world);
+        let events: Vec<Event> = self.steps.take().into_iter().filter(|e| self.is_sent(e, world)).collect();
+        put_events(&mut state, &events, &self.indices, world);
         hasher.bytes(|out| out.extend(&state[start..]));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         check_limit("bytes of a frame", state.len() + HEADER_BYTES, MAX_MESSAGE_BYTES)?;
         Ok(Published { state, hash, fresh, saturated })
+    }
+
+    /// Returns whether a facet knows the objects of an event: they are there, and in the table or in the scene file.
+    fn is_sent(&self, event: &Event, world: &World) -> bool {
+        let known = |id: ObjectId| self.indices.contains_key(&id) || self.base.object(id).is_some();
+        std::iter::once(event.a).chain(event.b).all(|id| world.object(id).is_some() && known(id))
     }
 
     /// Returns whether the table still describes the world: the same objects, with every stationary

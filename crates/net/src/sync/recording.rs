@@ -13,15 +13,17 @@
 //! | INPUT | facet | inputs since the frame before |
 //! | PRESENTED | facet | acknowledgements since then, each with its frame in the header |
 
+use super::events::LastStep;
 use super::input::Input;
 use super::messages::{Content, FrameAck, Join};
 use super::server::ServerEvent;
 use super::transport::{FacetNumber, MAX_MESSAGE_BYTES};
 use super::wire::{ByteReader, HEADER_BYTES, Hash, MessageError, MessageHeader, MessageKind, message, open};
 use crate::record::{
-    Contact, Deforming, Ending, MAX_STATE_BYTES, Pose, Reader, RecordError, Recorder, RecorderOptions, Summary, read,
+    Contact, Deforming, Ending, Images, MAX_EVENTS, MAX_STATE_BYTES, Pose, Reader, Readings, RecordError,
+    RecordedEvent, Recorder, RecorderOptions, Summary, read,
 };
-use crate::world::{contacts, deforming, entities, names, poses};
+use crate::world::{contacts, deforming, entities, events, images, names, poses, readings};
 use std::path::Path;
 use std::sync::Arc;
 use tumble_core::World;
@@ -48,6 +50,9 @@ struct WaitingFrame {
     poses: Vec<Pose>,
     contacts: Vec<Contact>,
     deforming: Deforming,
+    readings: Readings,
+    events: Vec<RecordedEvent>,
+    images: Images,
     /// Messages so far.
     messages: Vec<u8>,
 }
@@ -62,6 +67,11 @@ pub struct SessionRecorder {
     waiting: Option<WaitingFrame>,
     /// Inputs and acknowledgements of frames that are not recorded.
     notes: Vec<u8>,
+    /// Events of the steps since the last recorded frame.
+    steps: Vec<RecordedEvent>,
+    last_step: LastStep,
+    /// Whether images of cameras are recorded.
+    cameras: bool,
     list: Option<Arc<Vec<u8>>>,
     names: Vec<String>,
     scene: [u8; 32],
@@ -95,6 +105,9 @@ impl SessionRecorder {
             count: 0,
             waiting: None,
             notes: Vec::new(),
+            steps: Vec::new(),
+            last_step: LastStep::default(),
+            cameras: false,
             list: None,
             names,
             scene,
@@ -103,7 +116,24 @@ impl SessionRecorder {
         })
     }
 
-    /// Records the last published frame:
+    /// Records the images of all cameras with each recorded frame. By default there are none.
+    #[must_use]
+    pub fn with_cameras(mut self, cameras: bool) -> SessionRecorder {
+        self.cameras = cameras;
+        self
+    }
+
+    /// Takes the events of the world's last step into the next recorded frame. A program that makes several steps a frame calls
+    /// it after each; [`frame`](Self::frame) does it for the last one. Of more than
+    /// [`MAX_EVENTS`](crate::record::MAX_EVENTS) the first ones are recorded.
+    pub fn step(&mut self, world: &World) {
+        if self.last_step.is_new(world) && self.steps.len() < MAX_EVENTS {
+            self.steps.extend(events(world));
+            self.steps.truncate(MAX_EVENTS);
+        }
+    }
+
+    /// Records the last published frame, with the readings of its sensors and the events of all steps since the last one:
     /// [`ServerSession::recorded`](super::ServerSession::recorded) of the world at that time, with
     /// `fresh` at the first call.
     ///
@@ -112,6 +142,7 @@ impl SessionRecorder {
     pub fn frame(&mut self, world: &World, recorded: FrameRecord) -> Result<(), RecordError> {
         let first = self.count == 0;
         self.list = recorded.snapshot.or(self.list.take());
+        self.step(world);
         self.count += 1;
         if !(self.count - 1).is_multiple_of(self.every as u64) {
             return Ok(());
@@ -138,8 +169,17 @@ impl SessionRecorder {
         let done = FrameAck { hash: recorded.hash, ..FrameAck::default() };
         out.extend(message(&head(MessageKind::Ready), |out| done.write(out)));
         let (frame, time_s) = (recorded.frame, file_time_s);
-        let (poses, contacts, deforming) = (poses(world), contacts(world), deforming(world));
-        self.waiting = Some(WaitingFrame { frame, time_s, poses, contacts, deforming, messages: out });
+        self.waiting = Some(WaitingFrame {
+            frame,
+            time_s,
+            poses: poses(world),
+            contacts: contacts(world),
+            deforming: deforming(world),
+            readings: readings(world),
+            events: std::mem::take(&mut self.steps),
+            images: if self.cameras { images(world) } else { Images::new() },
+            messages: out,
+        });
         Ok(())
     }
 
@@ -180,7 +220,9 @@ impl SessionRecorder {
     fn write_waiting(&mut self) -> Result<(), RecordError> {
         let Some(mut waiting) = self.waiting.take() else { return Ok(()) };
         waiting.messages.append(&mut self.notes);
-        let WaitingFrame { frame, time_s, poses, contacts, deforming, messages } = waiting;
+        let WaitingFrame { frame, time_s, poses, contacts, deforming, readings, events, images, messages } = waiting;
+        self.recorder.report(&readings, &events)?;
+        self.recorder.images(&images)?;
         self.recorder.deforming(time_s, &deforming)?;
         self.recorder.frame(time_s, frame, &poses, &contacts, &messages)
     }

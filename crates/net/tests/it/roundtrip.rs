@@ -183,3 +183,57 @@ fn readings_and_events_come_back_with_their_frames() {
     assert_eq!(first.channel.message_encoding, "json");
     assert_eq!(String::from_utf8_lossy(&first.data), r#"{"imu":[0.0,-1e-300,9.81],"ß":[1.0]}"#);
 }
+
+/// Images of cameras: what is written is read, by the project and by the reader of MCAP, and a recovered file has them too.
+#[test]
+fn images_of_cameras_are_read_as_they_were_written() {
+    let scratch = Scratch::new("images");
+    let path = scratch.file("a.mcap");
+    let mut recorder = Recorder::create(&path, WORLD, &entities(), RecorderOptions::default()).unwrap();
+    let images = |k: u64| {
+        let depth =
+            Pixels::Depth((0..6).map(|pixel| if pixel == 2 { -1.0 } else { 0.1 * (k + pixel) as f32 }).collect());
+        let color = Pixels::Color(vec![[k as u8, 128, 255]; 2]);
+        let parts = Pixels::Parts(vec![None, Some(0), Some(2), Some(65_534)]);
+        let image = |width, height, pixels| RecordedImage { width, height, pixels };
+        let all = [("eye", image(3, 2, depth)), ("left/ß", image(1, 2, color)), ("parts", image(4, 1, parts))];
+        Images::from(all.map(|(name, image)| (name.to_owned(), image)))
+    };
+    let shown = |k: u64| if k.is_multiple_of(2) { images(k) } else { Images::new() };
+    for k in 0..20 {
+        recorder.images(&shown(k)).unwrap();
+        let mut wrong = |pixels, why: &str| {
+            let image = RecordedImage { width: 2, height: 1, pixels };
+            let error = recorder.images(&Images::from([("eye".into(), image)])).unwrap_err().to_string();
+            assert!(error.contains("\"eye\"") && error.contains(why), "{error}");
+        };
+        wrong(Pixels::Depth(vec![1.0]), "1 pixels for 2 x 1");
+        wrong(Pixels::Depth(vec![1.0, f32::NAN]), "not finite");
+        wrong(Pixels::Parts(vec![None, Some(65_535)]), "entity 65535; the first 65535 can be recorded");
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
+    }
+    let many = (0..=MAX_CAMERAS).map(|k| (format!("camera {k}"), images(0)["eye"].clone())).collect();
+    recorder.images(&many).unwrap();
+    assert!(recorder.frame(time(20), 20, &poses(20), &[], &state(20)).unwrap_err().to_string().contains("128 cameras"));
+    drop(recorder);
+    let path = scratch.file("b.mcap");
+    let mut recorder = Recorder::create(&path, WORLD, &entities(), RecorderOptions::default()).unwrap();
+    for k in 0..20 {
+        recorder.images(&shown(k)).unwrap();
+        recorder.frame(time(k), k, &poses(k), &[], &state(k)).unwrap();
+    }
+    recorder.finish().unwrap();
+    let mended = scratch.file("mended.mcap");
+    recover(&path, &mended).unwrap();
+    for file in [&path, &mended] {
+        let (frames, _) = read_all(file);
+        assert_eq!(frames.len(), 20);
+        for (k, frame) in (0..).zip(&frames) {
+            assert_eq!(frame.images, shown(k));
+        }
+    }
+    let bytes = std::fs::read(&path).unwrap();
+    let messages: Vec<mcap::Message> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    let eye: Vec<_> = messages.iter().filter(|m| m.channel.topic == "/tumble/cameras/eye").collect();
+    assert_eq!((eye.len(), eye[0].channel.schema.as_ref().unwrap().name.as_str()), (10, "foxglove.RawImage"));
+}

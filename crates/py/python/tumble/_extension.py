@@ -52,9 +52,10 @@ class Behavior:
 
 
 class Intersect:
-    """Base class of intersection tests of a body's own: define ``contacts`` and pass an object as ``intersect`` of ``World.add_rigid``.
+    """Base class of intersection tests of a body's own: define ``contacts`` and pass an object as ``intersect`` of ``World.add_rigid``, or to
+    ``Articulation.set_intersect`` for a link.
 
-    It is the narrow phase of all pairs with that body. The shape of the body surrounds the true surface: the broad phase, rays, distances,
+    It is the narrow phase of all pairs with that body or link. The shape of the body surrounds the true surface: the broad phase, rays, distances,
     particles and pictures see the shape. The object is called on any thread, by forks too, and must not change.
     """
 

@@ -1725,6 +1725,13 @@ class Articulation:
 
         shape: name, or number as ``shapes`` of contacts has it.
         """
+    def set_intersect(self, link: str, test: Intersect | None, shape: int | str | None = None) -> None:
+        """Gives the shapes of a link of a body in a world an intersection test of their own, or takes it for None: a function that
+        decides with what the link collides.
+
+        test: an object of a subclass of ``tumble.Intersect``, or None. shape: one shape only, by name or number as ``shapes`` of
+        contacts has it; the whole compound for a part of one. Shapes of other links that are fixed to it are not meant.
+        """
     def set_shape_material(
         self,
         link: str,
@@ -2228,7 +2235,7 @@ class Recorder:
     The file is created by the first frame. After a crash the file is readable up to the last
     quarter of a simulated second.
     """
-    def __new__(cls, path: _Path) -> Recorder: ...
+    def __new__(cls, path: _Path, *, cameras: bool = False) -> Recorder: ...
     def frame(self, world: World) -> None:
         """Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
         each once.
@@ -3111,7 +3118,9 @@ class World:
         ``"depth"``, ``"segmentation"`` and ``"color"`` are cameras that look along z of the site, with x to the right and y down in the image.
         resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
         they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
-        columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.
+        columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects. An
+        image has one bias; a segmentation has no noise. With a delay a camera makes its image after every step, and keeps it
+        in the state.
         """
     @property
     def sensors(self) -> Sensors:

@@ -68,6 +68,10 @@ class Recording:
     indices in ``names``; ``shapes`` (2,), numbers as in ``World.contacts``; ``point`` (3,), m; ``normal`` (3,), from the second body to the first; ``depth``, m; ``force`` (3,) on the first, N."""
     sensors: dict[str, NDArray[np.float64]]
     """Readings of each measuring sensor by its name, shape (n, k); NaN while it did not exist."""
+    images: dict[str, NDArray[np.float32] | NDArray[np.uint8] | NDArray[np.int32]]
+    """Images of each camera by its name, if the recorder wrote them: depths, shape (n, rows, columns), m, -1 where nothing is; colors, shape
+    (n, rows, columns, 3); of a segmentation the indices in ``names``, shape (n, rows, columns), -1 for nothing. NaN, black or -1 for a
+    frame without one."""
     events: list[list[RecordedEvent]]
     """Events of the step before each frame, at most 4096."""
     note: str | None

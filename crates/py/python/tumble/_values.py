@@ -97,6 +97,10 @@ class IntersectPart(NamedTuple):
     """The same as a matrix, shape (3, 3)."""
     shape: Shape
     """Its shape in its frame."""
+    link: str | None
+    """Name of the link whose shape it is; None for all but articulations."""
+    shape_name: str | None
+    """Name of its shape, if it has one; of a compound that of the first part."""
 
 
 class LinkSpheres(NamedTuple):

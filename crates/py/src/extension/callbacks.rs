@@ -14,7 +14,9 @@ use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;
-use tumble::dynamics::{ForceGenerator, Forces, Mode, Object, ObjectId, StateRange, World, WorldView, Wrench};
+use tumble::dynamics::{
+    ForceGenerator, Forces, Intersect, Mode, Object, ObjectId, StateRange, World, WorldView, Wrench,
+};
 
 /// A force written in Python as an object of the world.
 struct PythonForce {
@@ -63,8 +65,14 @@ pub fn empty_force(name: &str) -> Box<dyn Object> {
 /// Python objects by the name of the object of the world that calls them.
 type Named = Vec<(String, Py<PyAny>)>;
 
-/// Names and objects of forces; names, objects and bodies of behaviors; callables of events; intersection tests of bodies.
-pub type Extensions = (Named, Vec<(String, Py<PyAny>, Vec<String>)>, Named, Named);
+/// A link, and the number of one of its shapes; of a compound that of its first part.
+pub type OfLink = (String, usize);
+
+/// The body of an intersection test, its object, and the link that has it.
+type TestRecord = (String, Py<PyAny>, Option<OfLink>);
+
+/// Names and objects of forces; names, objects and bodies of behaviors; callables of events; intersection tests of bodies and links.
+pub type Extensions = (Named, Vec<(String, Py<PyAny>, Vec<String>)>, Named, Vec<TestRecord>);
 
 /// The result of `__reduce__`: the function that makes the world, its arguments, and the state for
 /// `__setstate__`.
@@ -82,9 +90,10 @@ struct Called {
     code: Code,
 }
 
-/// The intersection test of a body.
+/// The intersection test of a body, or of a link of it.
 struct Tested {
     body: ObjectId,
+    link: Option<OfLink>,
     test: Arc<PythonTest>,
 }
 
@@ -113,22 +122,40 @@ impl Extension {
             calls: self.calls.iter().map(called).collect(),
             tests: Vec::new(),
         };
-        self.tests.iter().for_each(|tested| fork.set_test(world, tested.body, tested.test.object.clone()));
+        for Tested { body, link, test } in &self.tests {
+            let _ = fork.set_test(world, *body, link.clone(), Some(test.object.clone())); // as it was set here
+        }
         fork
     }
 
-    /// Gives a body of a world an intersection test.
-    fn set_test(&mut self, world: &mut World, body: ObjectId, object: Callable) {
-        let test = Arc::new(PythonTest::new(object));
-        if world.set_intersect(body, Some(test.clone())).is_ok() {
-            self.tests.push(Tested { body, test });
-        }
+    /// Gives a body of a world, or a link of it, an intersection test, or takes it.
+    fn set_test(
+        &mut self,
+        world: &mut World,
+        body: ObjectId,
+        link: Option<OfLink>,
+        object: Option<Callable>,
+    ) -> Result<()> {
+        let test = object.map(|object| Arc::new(PythonTest::new(object)));
+        give(world, body, link.as_ref(), test.clone())?;
+        self.tests.retain(|tested| tested.body != body || tested.link != link);
+        self.tests.extend(test.map(|test| Tested { body, link, test }));
+        Ok(())
     }
 
     /// Drops what belongs to a removed object.
     pub fn forget(&mut self, id: ObjectId) {
         self.calls.retain(|called| called.event != id);
         self.tests.retain(|tested| tested.body != id);
+    }
+}
+
+/// Sets the intersection test of a body or of a link.
+fn give(world: &mut World, body: ObjectId, link: Option<&OfLink>, test: Option<Arc<PythonTest>>) -> Result<()> {
+    let test = test.map(|test| test as Arc<dyn Intersect>);
+    match link {
+        None => Ok(world.set_intersect(body, test)?),
+        Some((link, shape)) => Ok(world.set_link_intersect(body, link, Some(*shape), test)?),
     }
 }
 
@@ -176,9 +203,10 @@ impl Inner {
         &self.extension.calls[number].code
     }
 
-    /// Gives a body an intersection test; it must have `contacts`.
-    pub fn add_test(&mut self, body: ObjectId, object: &Bound<'_, PyAny>) {
-        self.extension.set_test(&mut self.world, body, Arc::new(object.clone().unbind()));
+    /// Gives a body or a link an intersection test, which must have `contacts`, or takes it.
+    pub fn set_test(&mut self, body: ObjectId, link: Option<OfLink>, object: Option<&Bound<'_, PyAny>>) -> Result<()> {
+        let object = object.map(|object| Arc::new(object.clone().unbind()));
+        self.extension.set_test(&mut self.world, body, link, object)
     }
 
     fn behave(&mut self) -> Result<()> {
@@ -280,7 +308,7 @@ impl Inner {
         let behaviors = self.extension.behaviors.iter().map(of).collect();
         let calls = self.extension.calls.iter().map(|c| (c.code.name.clone(), c.code.object.clone_ref(py))).collect();
         let tests = self.extension.tests.iter();
-        let tests = tests.filter_map(|t| Some((name(&t.body)?, t.test.object.clone_ref(py)))).collect();
+        let tests = tests.filter_map(|t| Some((name(&t.body)?, t.test.object.clone_ref(py), t.link.clone()))).collect();
         (!self.extension.is_empty()).then_some((forces, behaviors, calls, tests))
     }
 
@@ -294,9 +322,9 @@ impl Inner {
             let event = find(&self.world, &name)?;
             self.add_calls(event, &[object.into_bound(py)]);
         }
-        for (name, object) in tests {
+        for (name, object, link) in tests {
             let body = find(&self.world, &name)?;
-            self.add_test(body, object.bind(py));
+            self.set_test(body, link, Some(object.bind(py)))?;
         }
         for (name, object) in forces {
             let id = self.world.find(&name).filter(|id| self.extension.forces.contains(id));
@@ -316,7 +344,7 @@ impl Inner {
     pub fn take_extension(&mut self) -> impl Send + use<> {
         let Extension { forces, behaviors, calls, tests } = std::mem::take(&mut self.extension);
         for tested in &tests {
-            let _ = self.world.set_intersect(tested.body, None); // an error is a body that was removed
+            let _ = give(&mut self.world, tested.body, tested.link.as_ref(), None); // an error is a body that was removed
         }
         let forces: Vec<Option<Box<dyn Object>>> = forces.into_iter().map(|id| self.world.remove(id).ok()).collect();
         (forces, behaviors, calls, tests)

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::Mutex;
 use tumble::collide::{Contact, NormalFrom, Pose, Vec3};
-use tumble::dynamics::{Intersect, IntersectPart, Object};
+use tumble::dynamics::{Intersect, IntersectPart};
 
 /// An object with `contacts`, and its pending exception.
 pub struct PythonTest {
@@ -59,8 +59,7 @@ impl Intersect for PythonTest {
 }
 
 fn name_of(part: &IntersectPart) -> String {
-    let object: &dyn Object = part.object;
-    object.name().to_string()
+    part.name().to_string()
 }
 
 /// Makes the `IntersectPart` of Python.
@@ -74,7 +73,8 @@ fn part<'py>(py: Python<'py>, part: &IntersectPart) -> Result<Bound<'py, PyAny>>
     let matrix = array(py, part.pose.rotation.to_rotation_matrix().matrix().transpose().as_slice());
     let matrix = matrix.call_method1("reshape", ((3, 3),))?;
     let class = py.import("tumble._values")?.getattr("IntersectPart")?;
-    Ok(class.call1((name_of(part), part.part, position, orientation, matrix, shape))?)
+    let (link, shape_name) = (part.link().map(str::to_owned), part.shape_name().map(str::to_owned));
+    Ok(class.call1((name_of(part), part.part, position, orientation, matrix, shape, link, shape_name))?)
 }
 
 /// Converts `(point, normal, gap[, feature[, core_own[, core_other]]])`.

@@ -14,10 +14,11 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use tumble::dynamics::ObjectId;
 use tumble::net::record::{
-    Contact, Ending, Pose, RecordedEvent, Recorder as Writer, RecorderOptions, decode_contacts, encode_contacts, read,
+    Contact, Ending, Images, Pixels, Pose, RecordedEvent, RecordedImage, Recorder as Writer, RecorderOptions,
+    decode_contacts, encode_contacts, read,
 };
 use tumble::net::world::{
-    self as net_world, contacts, deforming, entities, events, names as entity_names, poses, readings,
+    self as net_world, contacts, deforming, entities, events, images, names as entity_names, poses, readings,
 };
 
 /// Largest count of numbers, and of bytes of states, of a recording that is read at once.
@@ -46,6 +47,7 @@ enum Stage {
 #[pyclass(frozen, module = "tumble")]
 pub struct Recorder {
     path: PathBuf,
+    cameras: bool,
     stage: Mutex<Stage>,
     frames: Mutex<u64>,
 }
@@ -56,13 +58,14 @@ impl Open {
         Ok(Open { writer, world: world.clone(), objects: inner.world.ids().to_vec() })
     }
 
-    fn add(&mut self, world: &Arc<Shared>, inner: &Inner) -> Result<()> {
+    fn add(&mut self, world: &Arc<Shared>, inner: &Inner, cameras: bool) -> Result<()> {
         let core = &inner.world;
         if !Arc::ptr_eq(world, &self.world) || self.objects != core.ids() {
             self.writer.set_entities(core.time(), &entities(core))?;
             (self.world, self.objects) = (world.clone(), core.ids().to_vec());
         }
         self.writer.report(&readings(core), &events(core))?;
+        self.writer.images(&if cameras { images(core) } else { Images::new() })?;
         self.writer.deforming(core.time(), &deforming(core))?;
         Ok(self.writer.frame(core.time(), core.frame(), &poses(core), &contacts(core), &core.save())?)
     }
@@ -76,7 +79,7 @@ impl Recorder {
                 *stage = Stage::Open(Box::new(Open::begin(&self.path, world, inner)?));
             }
             match &mut *stage {
-                Stage::Open(open) => open.add(world, inner),
+                Stage::Open(open) => open.add(world, inner, self.cameras),
                 _ => Err(Error::value(format!("{}: the recording is closed", self.path.display()))),
             }
         })?;
@@ -87,9 +90,11 @@ impl Recorder {
 
 #[pymethods]
 impl Recorder {
-    /// path: of the file. An existing file is replaced; its folder must exist.
+    /// path: of the file. An existing file is replaced; its folder must exist. cameras: whether frames have the images of all
+    /// cameras, which make it large.
     #[new]
-    fn new(path: &Bound<'_, PyAny>) -> Result<Recorder> {
+    #[pyo3(signature = (path, *, cameras=false))]
+    fn new(path: &Bound<'_, PyAny>, cameras: bool) -> Result<Recorder> {
         let path = self::path(path)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
@@ -97,7 +102,7 @@ impl Recorder {
                 std::io::Error::new(std::io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
             return Err(Error::File { file: path.display().to_string(), source });
         }
-        Ok(Recorder { path, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
+        Ok(Recorder { path, cameras, stage: Mutex::new(Stage::Empty), frames: Mutex::new(0) })
     }
 
     /// Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
@@ -189,6 +194,8 @@ struct Frames {
     contacts: Vec<Vec<u8>>,
     sensors: BTreeMap<String, Vec<(usize, Vec<f64>)>>,
     events: Vec<Vec<RecordedEvent>>,
+    /// Images of each camera with their frames; those of segmentations refer to names.
+    images: BTreeMap<String, Vec<(usize, RecordedImage)>>,
     /// Numbers of all sensors in a frame.
     width: usize,
     bytes: usize,
@@ -214,6 +221,48 @@ impl Frames {
             column[row * length..(row + 1) * length].copy_from_slice(reading);
         }
         (column, length)
+    }
+
+    /// Returns the images of a camera, with NaN, black or −1 for a frame without one. Images of another kind or size than the
+    /// first are left out.
+    fn film<'py>(&self, py: Python<'py>, images: &[(usize, RecordedImage)]) -> Result<Bound<'py, PyAny>> {
+        let Some((_, first)) = images.first() else { return Ok(py.None().into_bound(py)) };
+        let (frames, [height, width]) = (self.times.len(), [first.height, first.width].map(|n| n as usize));
+        let alike = images.iter().filter(|(_, image)| (image.width, image.height) == (first.width, first.height));
+        let at = |row: &usize| row * width * height;
+        match first.pixels {
+            Pixels::Depth(_) => {
+                let mut film = vec![f32::NAN; frames * width * height];
+                for (row, image) in alike {
+                    if let Pixels::Depth(depths) = &image.pixels {
+                        film[at(row)..at(row) + depths.len()].copy_from_slice(depths);
+                    }
+                }
+                Ok(PyArray1::from_vec(py, film).reshape([frames, height, width])?.into_any())
+            }
+            Pixels::Color(_) => {
+                let mut film = vec![[0_u8; 3]; frames * width * height];
+                for (row, image) in alike {
+                    if let Pixels::Color(colors) = &image.pixels {
+                        film[at(row)..at(row) + colors.len()].copy_from_slice(colors);
+                    }
+                }
+                Ok(PyArray1::from_vec(py, film.into_flattened()).reshape([frames, height, width, 3])?.into_any())
+            }
+            Pixels::Parts(_) => {
+                let mut film = vec![-1_i32; frames * width * height];
+                for (row, image) in alike {
+                    if let Pixels::Parts(parts) = &image.pixels {
+                        let columns = &self.poses[*row].0;
+                        let column = |part: &Option<u32>| columns.get((*part)? as usize).copied();
+                        for (pixel, part) in film[at(row)..].iter_mut().zip(parts) {
+                            *pixel = column(part).map_or(-1, |column| column as i32);
+                        }
+                    }
+                }
+                Ok(PyArray1::from_vec(py, film).reshape([frames, height, width])?.into_any())
+            }
+        }
     }
 
     /// Returns both arrays, with NaN for a name without a pose.
@@ -245,6 +294,11 @@ pub fn read_recording<'py>(py: Python<'py>, path: &Bound<'py, PyAny>) -> Result<
         sensors.set_item(name, PyArray1::from_vec(py, column).reshape([frames, length])?)?;
     }
     dict.set_item("sensors", sensors)?;
+    let cameras = PyDict::new(py);
+    for (name, images) in &all.images {
+        cameras.set_item(name, all.film(py, images)?)?;
+    }
+    dict.set_item("images", cameras)?;
     let event = |e: &RecordedEvent| {
         let pair = |[a, b]: &[Option<String>; 2]| (a.clone(), b.clone());
         let (shapes, names) = ((e.shapes[0], e.shapes[1]), pair(&e.shape_names));
@@ -284,6 +338,9 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         let contacts = named_contacts(&frame.contacts, &columns);
         all.bytes += frame.state.len() + contacts.len();
         all.bytes += frame.sensors.values().map(|reading| 8 * reading.len()).sum::<usize>();
+        // at most 12 bytes a pixel in the arrays and before
+        all.bytes +=
+            frame.images.values().map(|image| 12 * image.width as usize * image.height as usize).sum::<usize>();
         let names = |e: &RecordedEvent| {
             let sides = [&e.bodies, &e.links, &e.shape_names];
             e.a.len() + sides.into_iter().flatten().flatten().map(String::len).sum::<usize>()
@@ -300,6 +357,9 @@ fn whole(file: &PathBuf) -> Result<(String, Frames, Option<String>)> {
         }
         for (name, reading) in frame.sensors {
             all.sensors.entry(name).or_default().push((all.times.len(), reading));
+        }
+        for (name, image) in frame.images {
+            all.images.entry(name).or_default().push((all.times.len(), image));
         }
         all.events.push(frame.events);
         all.times.push(frame.time_s);

@@ -16,6 +16,7 @@ pub mod joint_constants;
 pub mod joint_dof;
 pub mod joints;
 pub mod link;
+pub mod link_intersect;
 pub mod mimic;
 pub mod place;
 pub mod robot;

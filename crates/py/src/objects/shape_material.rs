@@ -182,7 +182,7 @@ impl Articulation {
 
 impl Articulation {
     /// Returns the part and the index there of a shape of a link.
-    fn of_link(&self, link: &str, shape: Which) -> Result<(usize, usize)> {
+    pub(super) fn of_link(&self, link: &str, shape: Which) -> Result<(usize, usize)> {
         let number = match shape {
             Which::Number(number) => number,
             Which::Name(name) => self.shape_number(link, &name)?,

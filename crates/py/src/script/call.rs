@@ -10,7 +10,7 @@ use crate::script::action::Action;
 use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use tumble::collide::Vec3;
-use tumble::dynamics::{Action as Deed, Event, EventKind, ScriptedEvent, Subject, World as Core};
+use tumble::dynamics::{Action as Deed, Event, EventKind, Firing as Cause, Subject, World as Core};
 
 /// The cause of a firing, for the callables of the event.
 struct Firing {
@@ -25,17 +25,8 @@ struct Firing {
 impl Firing {
     fn of(world: &Core, fired: &Event) -> Firing {
         let name = |id| world.name(id).unwrap_or_default().to_string();
-        let trigger = world.get::<ScriptedEvent>(fired.a).map(ScriptedEvent::trigger);
-        let met = |e: &&Event| fired.b.is_some() && trigger.is_some_and(|t| t.met(e) == Some(fired.b));
-        let cause = world.events().iter().filter(met).max_by(|a, b| a.impulse.norm().total_cmp(&b.impulse.norm()));
-        let on_other = |e: &Event| if e.b == fired.b { -e.impulse } else { e.impulse };
-        Firing {
-            event: name(fired.a),
-            other: fired.b.map(name),
-            time: world.time(),
-            impulse: cause.map_or_else(Vec3::zeros, on_other),
-            point: cause.map_or_else(Vec3::zeros, |e| e.point),
-        }
+        let Cause { event, other, impulse, point, .. } = Cause::of(world, fired);
+        Firing { event: name(event), other: other.map(name), time: world.time(), impulse, point }
     }
 
     fn object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -88,10 +88,7 @@ pub fn add(
         Ok(Place { shared: shared.clone(), id, name })
     })?;
     if let Some(test) = intersect {
-        shared.extend(py, |inner| {
-            inner.add_test(place.id, test);
-            Ok(())
-        })?;
+        shared.extend(py, |inner| inner.set_test(place.id, None, Some(test)))?;
     }
     RigidBody::new(py, place)
 }

@@ -128,14 +128,17 @@ pub struct Recording {
     pub file: PathBuf,
     /// Interval between recorded frames, 1 to 10 000. Default 1.
     pub every_frames: u32,
+    /// Whether the images of cameras are recorded. Default false.
+    pub cameras: bool,
 }
 
 impl Recording {
     pub(crate) fn read(mut f: Fields<'_>, folder: &Path) -> Option<Recording> {
         let file = f.text("file", "the path of an .mcap file").map(|(text, _)| folder.join(text));
         let every_frames = f.integer_or("every_frames", 1..=10_000, 1);
+        let cameras = f.flag_or("cameras", false);
         f.finish();
-        file.map(|file| Recording { file, every_frames })
+        file.map(|file| Recording { file, every_frames, cameras })
     }
 }
 

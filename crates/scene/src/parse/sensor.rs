@@ -1,7 +1,7 @@
 //! `[[sensor]]`: a measuring sensor on a body, a link, a loop joint or the world.
 
 use tumble_core::collide::Pose;
-use tumble_core::{MAX_DELAY, Optics, SensorKind, SensorNoise};
+use tumble_core::{MAX_DELAY, MAX_DELAYED_PIXELS, Optics, SensorKind, SensorNoise};
 
 use crate::parse::body::{Library, read_name};
 use crate::parse::bound::Bound;
@@ -82,11 +82,16 @@ impl SensorSpec {
             |f: &mut Fields<'_>, key, read: bool| if read { f.number_or(key, Bound::NOT_NEGATIVE, 0.0) } else { 0.0 };
         let noise = SensorNoise {
             deviation: number(&mut f, "deviation", noisy),
-            bias_walk: number(&mut f, "bias_walk", optics.is_none()),
+            bias_walk: number(&mut f, "bias_walk", noisy),
             quantization: number(&mut f, "quantization", scaled),
-            delay: if optics.is_none() { f.integer_or("delay", 0..=MAX_DELAY, 0) } else { 0 },
-            seed: if noisy { f.seed() } else { 0 },
+            delay: f.integer_or("delay", 0..=MAX_DELAY, 0),
+            seed: f.seed(),
         };
+        if let (Some(Optics { resolution: [width, height], .. }), Some(value)) = (optics, f.value("delay"))
+            && u64::from(width) * u64::from(height) * u64::from(noise.delay) > MAX_DELAYED_PIXELS
+        {
+            f.wrong("delay", value, "steps whose images have at most 4194304 pixels in all");
+        }
         let enabled = f.flag_or("enabled", true);
         let place = match on {
             None if kind.reads_dof() || kind.reads_joint() || kind == SensorKind::Touch => {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tumble_core::{SensorKind, World};
+use tumble_core::{Sensor, SensorKind, SensorNoise, World};
 use tumble_scene::mjcf::{MjcfOptions, load, parse};
 use tumble_scene::{SceneFile, SensorPlaceSpec};
 
@@ -144,6 +144,34 @@ fn sensors_of_a_scene_read_what_holds_its_bodies() {
     assert!(reading(&world, "angle")[0].abs() <= 0.2);
 }
 
+/// Cameras of a scene have the errors of other sensors, and a saved scene has them again.
+#[test]
+fn cameras_have_a_delay_and_a_walk_of_their_bias() {
+    let text = "[[body]]\nname = \"ground\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n\
+        [[sensor]]\nname = \"eye\"\ntype = \"depth\"\ndelay = 3\nbias_walk = 0.5\nseed = 9\n\
+        [[sensor]]\nname = \"red\"\ntype = \"color\"\ndeviation = 2\nquantization = 4\ndelay = 1\n\
+        [[sensor]]\nname = \"parts\"\ntype = \"segmentation\"\ndelay = 2\nseed = 1\n";
+    let noises = |world: &World| {
+        let noise = |name: &str| *world.get::<Sensor>(world.find(name).unwrap()).unwrap().noise();
+        ["eye", "red", "parts"].map(noise)
+    };
+    let (world, _) = SceneFile::parse(text, "s.toml").unwrap().build().unwrap();
+    let expected = [
+        SensorNoise { delay: 3, bias_walk: 0.5, seed: 9, ..SensorNoise::default() },
+        SensorNoise { deviation: 2.0, quantization: 4.0, delay: 1, ..SensorNoise::default() },
+        SensorNoise { delay: 2, seed: 1, ..SensorNoise::default() },
+    ];
+    assert_eq!(noises(&world), expected);
+    let folder = std::env::temp_dir().join(format!("tumble-scene-{}-cameras", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    tumble_scene::SceneWriter::new(&world).save(folder.join("scene.toml")).unwrap();
+    let text = std::fs::read_to_string(folder.join("scene.toml")).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    // the text alone, without the archive beside it
+    let text = text.replace("saved_world = \"scene_files/state.world\"\n", "");
+    assert_eq!(noises(&SceneFile::parse(&text, "s.toml").unwrap().build().unwrap().0), expected);
+}
+
 /// The frame of a body is that of its shape, not the one about its center of mass.
 #[test]
 fn sites_on_a_body_are_in_the_frame_of_its_shape() {
@@ -193,6 +221,11 @@ fn faults_of_sensors_are_reported_with_their_place() {
         ("type = \"drive_force\"\non = \"post/cap\"", "expected a link with a revolute or prismatic joint"),
         ("type = \"joint_position\"\non = \"box\"", "expected a link with a revolute or prismatic joint"),
         ("type = \"joint_position\"\non = \"hook\"", "expected a loop joint with a position"),
+        (
+            "type = \"depth\"\nresolution = [1000, 1000]\ndelay = 5",
+            "`delay` of sensor \"bad\" is 5; expected steps whose images have at most 4194304 pixels in all",
+        ),
+        ("type = \"segmentation\"\nbias_walk = 0.1", "unknown key `bias_walk`"),
         ("type = \"gyroscope\"\non = \"hook\"", "expected a body or a link: this type of sensor reads a site"),
     ] {
         let said = fault(sensor);

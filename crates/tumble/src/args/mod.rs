@@ -90,6 +90,9 @@ pub struct RunOptions {
     /// Write a recording (MCAP; opens in Foxglove).
     #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Write the images of all cameras to the recording.
+    #[arg(long, help_heading = "Results", requires = "record")]
+    pub record_cameras: bool,
     /// Write a summary (JSON).
     #[arg(long, help_heading = "Results", value_name = "FILE")]
     pub summary: Option<PathBuf>,

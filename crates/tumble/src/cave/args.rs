@@ -84,6 +84,9 @@ pub struct ServeOptions {
     /// Record states, inputs and acknowledgements (MCAP), instead of [recording] in the cave file.
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Write the images of all cameras to the recording, also to that of the cave file.
+    #[arg(long)]
+    pub record_cameras: bool,
     /// Write counts and timings (JSON).
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
@@ -144,6 +147,10 @@ pub struct ServeOptions {
     /// facets.
     #[arg(long)]
     pub contacts: bool,
+    /// Send the events of every frame, at most 1024, for programs that read them in a facet. The readings of
+    /// sensors are sent always.
+    #[arg(long)]
+    pub events: bool,
     /// Place where the world is stepped (default: as the cave says). With everywhere, each facet steps it
     /// by itself from the users' inputs, and its states are compared with the server's.
     #[arg(long, value_name = "WHERE")]

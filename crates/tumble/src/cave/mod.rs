@@ -73,9 +73,17 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
     let sound = serve.sound.is_some() || serve.audio.is_some();
     let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
-    if serve.record.is_some() || users || stepping || serve.contacts || everywhere || sound {
+    if serve.record.is_some()
+        || serve.record_cameras
+        || users
+        || stepping
+        || serve.contacts
+        || serve.events
+        || everywhere
+        || sound
+    {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --audio, --replay-input, --contacts, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --record-cameras, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --audio, --replay-input, --contacts, --events, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

@@ -3,7 +3,7 @@
 use crate::cave_place::in_place;
 use crate::cave_users::place;
 use crate::common::*;
-use tumble::net::record::recover;
+use tumble::net::record::{Frame, read, recover};
 use tumble::net::sync::{RecordedFrame, SessionReader};
 
 /// Returns opcode, begin and end of each record of an MCAP file. The file has a magic of 8 bytes,
@@ -116,4 +116,63 @@ fn a_recording_without_frames_is_named_as_such() {
             assert!(wrong.contains(&why) && !wrong.contains("hash"), "{wrong}");
         }
     }
+}
+
+/// A world with sensors, a camera and events: the recording of a cave has them in the channels of a single run. A cave shows
+/// 60 frames a second, four steps each, and its frames have the events of all steps.
+#[test]
+fn a_cave_records_sensors_events_and_cameras_like_a_single_run() {
+    const SENSED: &str = r#"
+[[body]]
+name = "ground"
+mode = "static"
+shape = { type = "half_space" }
+[[body]]
+name = "ball"
+shape = { type = "sphere", radius_m = 0.1 }
+mass_kg = 2
+position_m = [0, 0, 0.4]
+restitution = 0.5
+[[sensor]]
+name = "felt"
+type = "touch"
+on = "ball"
+[[sensor]]
+name = "imu"
+type = "accelerometer"
+on = "ball"
+deviation = 0.1
+delay = 1
+[[sensor]]
+name = "eye"
+type = "depth"
+position_m = [0, 0, 2]
+orientation_xyzw = [1, 0, 0, 0]
+resolution = [4, 3]
+delay = 2
+"#;
+    let (folder, _, cave) = place("cave-sensed");
+    let scene = folder.write("sensed.toml", SENSED);
+    let (single, cave_file) = (folder.path("single.mcap"), folder.path("cave.mcap"));
+    let run = |args: &[&str]| {
+        let out = in_place(&folder, args).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    };
+    let cameras = ["--record-cameras", "--quiet", "--duration", "0.5"];
+    run(&[&["run", &scene, "--record", &text(&single)][..], &cameras].concat());
+    let in_cave = ["--cave", &cave, "--no-pictures", "--no-realtime", "--fps", "60", "--events"];
+    run(&[&["cave", &scene, "--record", &text(&cave_file)][..], &in_cave, &cameras].concat());
+    let all = |file| read(file).unwrap().map(|frame| frame.unwrap()).collect::<Vec<Frame>>();
+    let (single, caves) = (all(&single), all(&cave_file));
+    let steps = (single.len() - 1) / (caves.len() - 1);
+    assert!(steps >= 4 && single.len() == steps * (caves.len() - 1) + 1, "{} {}", single.len(), caves.len());
+    for (frame, ours) in caves.iter().enumerate() {
+        let same = &single[steps * frame];
+        assert_eq!((&ours.sensors, &ours.images), (&same.sensors, &same.images), "frame {frame}");
+        let first = if frame == 0 { 0 } else { steps * (frame - 1) + 1 };
+        let events: Vec<_> = single[first..=steps * frame].iter().flat_map(|frame| frame.events.clone()).collect();
+        assert_eq!(ours.events, events, "frame {frame}");
+    }
+    assert!(caves.iter().any(|frame| frame.events.iter().any(|event| event.kind == "contact_end")));
+    assert!(caves.iter().all(|frame| frame.sensors.len() == 2 && frame.images.len() == 1));
 }

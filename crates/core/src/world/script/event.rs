@@ -1,6 +1,7 @@
 //! The object of a scripted event: its constants and its numbers of the state.
 
 use super::action::{Action, Subject};
+use super::call::Calls;
 use super::trigger::Trigger;
 use crate::object::net_sync::{read_state, write_state};
 use crate::object::part_state::StateRange;
@@ -51,12 +52,20 @@ pub struct ScriptedEvent {
     delay: f64,
     times: u32,
     actions: Arc<Vec<Action>>,
+    pub(super) calls: Calls,
 }
 
 impl ScriptedEvent {
     /// Makes an event that does nothing yet, fires as often as its trigger is met, and at once.
     pub fn new(name: impl Into<String>, trigger: Trigger) -> ScriptedEvent {
-        ScriptedEvent { name: name.into(), trigger, delay: 0.0, times: u32::MAX, actions: Arc::default() }
+        ScriptedEvent {
+            name: name.into(),
+            trigger,
+            delay: 0.0,
+            times: u32::MAX,
+            actions: Arc::default(),
+            calls: Calls::default(),
+        }
     }
 
     /// Adds an action. Actions run in the order in which they were added.

@@ -32,7 +32,7 @@ impl World {
         for (event, other) in self.core.firings() {
             self.perform(event, other)?;
         }
-        Ok(())
+        self.call_back()
     }
 }
 

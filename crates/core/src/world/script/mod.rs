@@ -31,6 +31,7 @@
 //! ```
 
 mod action;
+mod call;
 mod check;
 mod event;
 mod fire;
@@ -42,6 +43,7 @@ mod template;
 mod trigger;
 
 pub use action::{Action, CameraChange, LightChange, Subject};
+pub use call::Firing;
 pub use check::EventError;
 pub use event::ScriptedEvent;
 pub use looks::Looks;

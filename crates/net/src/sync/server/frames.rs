@@ -27,6 +27,7 @@ impl ServerSession {
             let stream = &mut self.streams[exact as usize];
             stream.state = Arc::default();
             if exact && !replicas {
+                stream.publisher.skip();
                 continue; // no replica, no work
             }
             let published = stream.publisher.publish(world, viewer, frame)?;
@@ -37,6 +38,11 @@ impl ServerSession {
         self.begin_times(frame, Some(viewer));
         self.send_frame(now, frame);
         Ok(frame)
+    }
+
+    /// Takes the events of the world's last step into the next frame: call it after each step of a frame with several.
+    pub fn step(&mut self, world: &World) {
+        self.streams.iter_mut().for_each(|stream| stream.publisher.step(world));
     }
 
     /// Publishes a recorded frame under its number. A session either simulates or replays. Replicas

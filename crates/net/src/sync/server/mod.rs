@@ -81,6 +81,9 @@ pub struct ServerOptions {
     /// Largest number of contacts that are sent with a frame ([`Publisher::with_contacts`]); 0 by
     /// default.
     pub contacts: usize,
+    /// Largest number of events that are sent with a frame ([`Publisher::with_events`]); 0 by default. The readings of sensors of
+    /// the scene file are sent always.
+    pub events: usize,
     /// BLAKE3 hash of the scene with all constants and settings, for facets that step the world by
     /// themselves ([`Content::Inputs`]). `None` by default: such facets are refused.
     pub compute: Option<[u8; 32]>,
@@ -102,6 +105,7 @@ impl ServerOptions {
             resend_interval: None,
             first_frame: 0,
             contacts: 0,
+            events: 0,
             compute: None,
         }
     }
@@ -284,9 +288,9 @@ impl ServerSession {
             present_requested: None,
         };
         let facets = options.slots.iter().map(facet_state).collect();
-        let contacts = options.contacts;
+        let (contacts, events) = (options.contacts, options.events);
         let stream = |exact| Stream {
-            publisher: Publisher::new(base, exact, 0).with_contacts(contacts),
+            publisher: Publisher::new(base, exact, 0).with_contacts(contacts).with_events(events),
             snapshot: Arc::default(),
             listed: None,
             state: Arc::default(),

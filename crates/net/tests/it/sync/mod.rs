@@ -12,6 +12,7 @@ mod pace;
 mod places;
 mod quantize;
 mod refusals;
+mod reports;
 pub mod simulated_session;
 mod threads;
 mod times;

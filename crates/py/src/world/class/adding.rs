@@ -289,7 +289,9 @@ impl World {
     /// ``"depth"``, ``"segmentation"`` and ``"color"`` are cameras that look along z of the site, with x to the right and y down in the image.
     /// resolution: pixels in a row and rows, by default (64, 48). vertical_fov: rad, by default π/4. Their readings are made when
     /// they are read: distances along z, m, shape (rows, columns), -1 where nothing is; and what a pixel shows, shape (rows,
-    /// columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects.
+    /// columns, 2): the index in ``world.bodies`` and that of the link in its ``link_names``, -1 for nothing and other objects. An
+    /// image has one bias; a segmentation has no noise. With a delay a camera makes its image after every step, and keeps it
+    /// in the state.
     #[pyo3(signature = (kind, on=None, *, name="", position=None, orientation=None, relative_to=None, volume=None, cutoff=None, deviation=0.0,
         bias_walk=0.0, quantization=0.0, delay=0, seed=0, resolution=None, vertical_fov=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]

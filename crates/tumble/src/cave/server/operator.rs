@@ -118,7 +118,10 @@ impl RunLoop<'_> {
         if std::fs::metadata(file).is_ok_and(|about| about.len() > 0) {
             return Err(format!("{file} exists; choose another name"));
         }
-        let target = Target { file: Path::new(file).to_owned(), every_frames: 1, named_by: NamedBy::CaveFile };
+        let cameras =
+            self.options.record_cameras || self.cave.recording.as_ref().is_some_and(|recording| recording.cameras);
+        let (file_path, named_by) = (Path::new(file).to_owned(), NamedBy::CaveFile);
+        let target = Target { file: file_path, every_frames: 1, cameras, named_by };
         let text = |failure: Failure| failure.report().trim().to_owned();
         self.recorder.start(&target, &self.scene, self.hash, &self.simulation.world, self.signals).map_err(text)?;
         Ok(format!("recording {file}"))

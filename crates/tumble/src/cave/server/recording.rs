@@ -40,7 +40,8 @@ impl RunRecorder {
         }
         let options = RecorderOptions::default();
         let recorder = SessionRecorder::create(recording.begins_at(), scene, hash, world, every, options)
-            .map_err(|e| Failure::run("recording", e))?;
+            .map_err(|e| Failure::run("recording", e))?
+            .with_cameras(target.cameras);
         Ok(RunRecorder { current: Some((recorder, recording)), recorded: false, failure: None })
     }
 
@@ -74,6 +75,13 @@ impl RunRecorder {
     /// Moves the recording to its target: the run begins.
     pub fn begin(&mut self) -> Result<(), Failure> {
         self.current.as_mut().map_or(Ok(()), |(_, recording)| recording.begin())
+    }
+
+    /// Takes the events of a step into the next frame.
+    pub fn step(&mut self, world: &World) {
+        if let Some((recorder, _)) = &mut self.current {
+            recorder.step(world);
+        }
     }
 
     /// Records the last frame of a session. An error ends the recording and is printed.
@@ -115,6 +123,8 @@ impl RunRecorder {
 pub struct Target {
     pub file: PathBuf,
     pub every_frames: u32,
+    /// Whether images of cameras are recorded.
+    pub cameras: bool,
     pub named_by: NamedBy,
 }
 
@@ -122,10 +132,13 @@ impl Target {
     /// Returns the recording of the command line, or else that of the cave file. A replay is not
     /// recorded.
     pub fn of(options: &ServeOptions, cave_file: Option<&cave::Recording>, replaying: bool) -> Option<Target> {
-        let given = options.record.clone().map(|file| Target { file, every_frames: 1, named_by: NamedBy::User });
+        let cameras = options.record_cameras;
+        let given =
+            options.record.clone().map(|file| Target { file, every_frames: 1, cameras, named_by: NamedBy::User });
         let of_cave = |r: &cave::Recording| Target {
             file: r.file.clone(),
             every_frames: r.every_frames,
+            cameras: cameras || r.cameras,
             named_by: NamedBy::CaveFile,
         };
         given.or_else(|| cave_file.map(of_cave)).filter(|_| !replaying)
@@ -237,7 +250,7 @@ mod tests {
     use tumble::net::record::Recorder;
 
     fn target(file: &Path, named_by: NamedBy) -> Target {
-        Target { file: file.to_owned(), every_frames: 1, named_by }
+        Target { file: file.to_owned(), every_frames: 1, cameras: false, named_by }
     }
 
     /// Writes a recording without frames, and returns its bytes.

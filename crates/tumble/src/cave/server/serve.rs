@@ -215,7 +215,10 @@ impl<'a> RunLoop<'a> {
         let inputs = std::mem::take(&mut self.inputs);
         self.server.send_inputs(FrameInputs { steps, inputs }).map_err(failed)?;
         let (sound, audio) = (&mut self.sound, &mut self.audio);
+        let (server, recorder) = (&mut self.server, &mut self.recorder);
         self.simulation.step(steps, |world| {
+            server.step(world);
+            recorder.step(world);
             sound.iter_mut().for_each(|sound| sound.step(world));
             audio.iter_mut().for_each(|audio| audio.step(world));
         })?;

@@ -23,7 +23,7 @@ use std::time::Duration;
 use tumble::net::sync::cpu_latency::CpuLatencyRequest;
 use tumble::net::sync::shm::{ShmServer, clean_up};
 use tumble::net::sync::udp::{Entropy, UdpServer};
-use tumble::net::sync::{FacetSlot, MAX_CONTACTS, Server, ServerOptions, SyncMode};
+use tumble::net::sync::{FacetSlot, MAX_CONTACTS, MAX_FRAME_EVENTS, Server, ServerOptions, SyncMode};
 use tumble::scene::cave::{Cave, Mode};
 
 /// Runs scenes in a cave one after the other, or replays a recording of one. With a launcher's options
@@ -192,6 +192,7 @@ fn session_options(options: &ServeOptions, setup: &RunSetup, run: u64, slots: &[
         drop_timeout: ms(sync.drop_timeout_ms),
         history: sync.history_frames as usize,
         contacts: if options.contacts { MAX_CONTACTS } else { 0 },
+        events: if options.events { MAX_FRAME_EVENTS } else { 0 },
         ..ServerOptions::new(run, setup.join_hash, slots.to_vec())
     }
 }
