@@ -35,10 +35,10 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::CachedTree;
-pub use covering::{CoveredShape, Covering, CoveringSphere};
+pub use covering::{CoveredShape, Covering, CoveringSphere, SurfacePiece};
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelSphere;
-pub use quality::{LevelQuality, QualitySettings};
+pub use quality::{LevelQuality, QualitySettings, SolidSamples};
 pub use select::grow_to_cover;
 pub use settings::{Builder, TreeSettings};
 pub use table::align_columns;
