@@ -16,7 +16,7 @@ fuzz_target!(|bytes: &[u8]| {
         let mut mended = mesh.clone();
         if mended.repair(&RepairSettings::default()).is_ok() {
             let again = mended.check_closed();
-        assert!(again.is_ok(), "what comes out of repair is a solid: {again:?}");
+            assert!(again.is_ok(), "what comes out of repair is a solid: {again:?}");
         }
         if mesh.check_closed().is_ok() {
             let _ = mesh.mass_properties(1.0);
