@@ -3,7 +3,7 @@
 use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or, whole_number};
 use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
-use crate::objects::appearance::palette;
+use crate::objects::appearance::{self, palette};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::inertia;
 use crate::objects::joints::drive_of;
@@ -81,16 +81,16 @@ impl ArticulationBuilder {
     /// max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
     /// ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
     /// ``Articulation.set_drive``. q, qd: position and velocity of a revolute or prismatic joint at the
-    /// start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,). cone: largest angle of a spherical joint
+    /// start. friction, restitution, contacts, group, mask, collidable: of the shapes, as in ``World.add_rigid``. color: sRGB, shape (3,); appearance: a ``tumble.Appearance`` instead. cone: largest angle of a spherical joint
     /// between its axis, x, y or z, on the link and on the parent, rad.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None))]
+        armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None, appearance=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
         joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=True, color=None, cone=None, \
-        contacts='surface', group=0, mask=None)"
+        contacts='surface', group=0, mask=None, appearance=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -127,6 +127,7 @@ impl ArticulationBuilder {
         contacts: &str,
         #[pyo3(from_py_with = whole_number)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
@@ -175,7 +176,10 @@ impl ArticulationBuilder {
             Some(color) => vec3(color, "color")?.map(|c| c as f32).into(),
             None => palette(self.builder().links().len()),
         };
-        link = link.with_appearance(Appearance { color, ..Appearance::default() });
+        link = link.with_appearance(match appearance.map(appearance::given).transpose()? {
+            Some(look) => look.in_body(&shape.as_ref().map_or_else(Vec3::zeros, |shape| shape.solid.center_of_mass())),
+            None => Appearance { color, ..Appearance::default() },
+        });
         link = with_mass(link, (mass, density), center_of_mass, inertia)?;
         if let Some(shape) = shape {
             link = with_shape(link, &shape, shape_position, shape_orientation, collidable)?;
@@ -190,9 +194,9 @@ impl ArticulationBuilder {
     /// overlap it.
     ///
     /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, contacts, group, mask, color:
-    /// by default those of the link. visible: whether it is drawn.
+    /// by default those of the link; appearance: a ``tumble.Appearance`` instead of the color. visible: whether it is drawn.
     #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None, sensor=false, mass=None, density=None,
-        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true))]
+        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true, appearance=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -212,6 +216,7 @@ impl ArticulationBuilder {
         mask: Option<&Bound<'_, PyAny>>,
         color: Option<&Bound<'_, PyAny>>,
         visible: bool,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         self.has(link)?;
         if mass.is_some() && density.is_some() {
@@ -222,6 +227,7 @@ impl ArticulationBuilder {
         let (group, mask) =
             (group.map(query::group).transpose()?, mask.map(|mask| query::mask(Some(mask))).transpose()?);
         let color = color.map(|color| vec3(color, "color")).transpose()?;
+        let look = appearance.map(appearance::given).transpose()?;
         let pose = pose(position, orientation)? * shape.placement;
         let mut builder = self.builder();
         let Some(known) = builder.link_mut(link) else { return Ok(()) };
@@ -240,7 +246,8 @@ impl ArticulationBuilder {
         };
         let with = mass.into_iter().fold(with.with_shape_visible(visible), LinkBuilder::with_shape_mass);
         let with = density.into_iter().fold(with, LinkBuilder::with_shape_density);
-        let looks = color.map(|color| Appearance { color: color.map(|c| c as f32).into(), ..Appearance::default() });
+        let plain = color.map(|color| Appearance { color: color.map(|c| c as f32).into(), ..Appearance::default() });
+        let looks = look.map(|look| look.in_body(&shape.solid.center_of_mass())).or(plain);
         *known = looks.into_iter().fold(with, LinkBuilder::with_shape_appearance);
         Ok(())
     }

@@ -16,6 +16,7 @@ pub mod joint_dof;
 pub mod joints;
 pub mod link;
 pub mod mimic;
+pub mod mounts;
 pub mod place;
 pub mod robot;
 pub mod sensor;
