@@ -150,7 +150,7 @@ fn documents_that_instance_themselves_end() {
         let nodes =
             format!("<library_nodes>{nodes}<node id=\"n60\">{geometry}</node></library_nodes><library_visual_scenes>");
         let start = "<instance_node url=\"#n0\"/>";
-        cube.replacen("<library_visual_scenes>", &nodes, 1).replacen("<instance_geometry url=\"#g\"/>", start, 1)
+        cube.replacen("<instance_geometry url=\"#g\"/>", start, 1).replacen("<library_visual_scenes>", &nodes, 1)
     };
     let said = read(&nested(""));
     assert!(said.contains("more than") && said.contains("nodes"), "{said}");
