@@ -18,7 +18,7 @@ mod sphere_tree;
 #[path = "../../../../fuzz/fuzz_targets/stl.rs"]
 mod stl;
 
-/// What replaces bytes: extreme numbers, numbers in binary, marks of the formats.
+/// Words that replace bytes: extreme numbers, numbers in binary, marks of the formats.
 const WORDS: [&[u8]; 24] = [
     b"0",
     b"-1",

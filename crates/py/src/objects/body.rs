@@ -405,7 +405,7 @@ impl RigidBody {
         self.change(py, |body| *body = appearance::colored(body.clone(), color))
     }
 
-    /// What its surface looks like, a ``tumble.Appearance``. It has no effect on motion.
+    /// The look of its surface, a ``tumble.Appearance``. It has no effect on motion.
     #[getter]
     fn appearance<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         appearance::shown(py, &self.constant(appearance::of)?)
@@ -417,9 +417,9 @@ impl RigidBody {
         self.change(py, |body| *body = appearance::described(body.clone(), &look))
     }
 
-    /// Attaches a camera, at most one: pictures of ``World.render`` and ``view`` can be taken from it by its body, and scenes
-    /// keep it. position: shape (3,), m; forward, up: directions, shape (3,), not parallel; all in the frame of the shape.
-    /// fov_deg: vertical field of view, degrees, 1 to 170. near, far: depths between which it sees, m.
+    /// Attaches a camera, at most one, that moves with the body and that scenes keep. position: shape (3,), m; forward, up:
+    /// directions, shape (3,), not parallel; all in the frame of the shape. fov_deg: vertical field of view, degrees, 1 to 170.
+    /// near, far: depths between which it sees, m.
     #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
     #[pyo3(
         text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"

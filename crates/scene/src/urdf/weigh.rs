@@ -88,7 +88,7 @@ pub(super) fn candidates(
     found
 }
 
-/// What spheres of any radius about fixed centers reach.
+/// The pieces and samples that spheres of any radius about fixed centers reach.
 struct Radii {
     spheres: Vec<Ball>,
     /// Area of each piece, as a fraction of the surface.
