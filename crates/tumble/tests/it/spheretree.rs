@@ -120,7 +120,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let (nowhere, here) = (text(&folder.path("nowhere/tree.json")), text(&folder.path("")));
     let bare = folder.write("bare.urdf", "<robot name=\"r\"><link name=\"a\"/></robot>");
     let gone = folder.write("gone.urdf", GONE);
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 24] = [
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
@@ -241,7 +241,11 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
             "self_collision_buffer:\n  \"a\": 0.0\n  \"b\": 0.0\n".to_string(),
         ])
         .collect();
-    assert_eq!(std::fs::read_to_string(yaml).unwrap(), wanted);
+    let written = std::fs::read_to_string(yaml).unwrap();
+    let (comments, rest): (Vec<&str>, Vec<&str>) = written.lines().partition(|line| line.trim_start().starts_with('#'));
+    assert_eq!(rest.join("\n") + "\n", wanted);
+    let starts = comments.iter().filter(|line| line.starts_with("  # covered 100.000 %; outside at most ")).count();
+    assert_eq!([comments.len(), starts], [2, 2], "the figures of each link");
     // the corners of the box are inside: 0.1 across, 0 and 1 along
     for corner in 0..8 {
         let p = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { [0.1, 0.1, 1.0][k] } else { [-0.1, -0.1, 0.0][k] });
