@@ -11,7 +11,8 @@ fuzz_target!(|text: &str| {
     }
     let mut mended = mesh.clone();
     if mended.repair(&RepairSettings::default()).is_ok() {
-        assert!(mended.check_closed().is_ok(), "what comes out of repair is a solid");
+        let again = mended.check_closed();
+        assert!(again.is_ok(), "what comes out of repair is a solid: {again:?}");
         let _ = mended.union_mass_properties(1.0);
         let _ = MeshDistance::new(&mended).closest(&mended.vertices[0]);
     }

@@ -62,7 +62,7 @@ pub use ray::{BoxTree, RayHit};
 pub use shape::{CompoundPart, CompoundShape, CylinderShape, MeshShape, Shape};
 pub use tree::{
     Builder, CachedTree, CoveredShape, Covering, CoveringSphere, LevelQuality, LevelSphere, MeshId, Progress,
-    QualitySettings, SphereNode, SphereTree, StageCount, TreeFile, TreeFileError, TreeSettings, align_columns,
-    grow_to_cover,
+    QualitySettings, SolidSamples, SphereNode, SphereTree, StageCount, SurfacePiece, TreeFile, TreeFileError,
+    TreeSettings, align_columns, grow_to_cover,
 };
 pub use union_find::UnionFind;

@@ -1,5 +1,7 @@
 """The short programs of ``examples/`` against closed forms that they do not compute, or compute in another way."""
 
+import ast
+import importlib.util
 import runpy
 import sys
 from pathlib import Path
@@ -12,7 +14,8 @@ import tumble
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 PROGRAMS = (
     "falling_stack double_pendulum four_bar arm_pd quadruped random_search domain_randomization record_and_replay save_restore "
-    "heavy_on_light linked_rings lidar dumbbell filters_and_triggers terrain custom_force vector_environment notebook_animation"
+    "heavy_on_light linked_rings lidar dumbbell filters_and_triggers terrain custom_force vector_environment notebook_animation "
+    "fork_control"
 ).split()
 G = 9.81
 
@@ -95,6 +98,28 @@ def test_random_search_comes_near_the_best_there_is(run):
     assert cart.q[0] == pytest.approx(1, abs=0.005) and cart.qd[0] == pytest.approx(0, abs=0.005)
     assert (mean**2).mean() < 1.02 * cheapest
     assert [cart.q[0], cart.qd[0]] == pytest.approx(conditions @ mean, abs=1e-9)
+
+
+def code(path):
+    """The lines of a program that are not blank and not its description."""
+    tree = ast.parse(path.read_text())
+    first = tree.body[1].lineno if ast.get_docstring(tree) else 1
+    return [line for line in path.read_text().splitlines()[first - 1 :] if line.strip() and not line.strip().startswith("#")]
+
+
+def test_forks_find_the_least_time_as_in_mujoco_and_in_fewer_lines(run):
+    names = run("fork_control")
+    # bang-bang: 1 m with 4 N on 1 kg takes 2 √(m d/F) = 1 s, and 50 steps of 0.02 s hit it
+    assert names["world"].time == pytest.approx(1.0) and names["cart"].q == pytest.approx([1.0], abs=1e-9)
+    assert names["cart"].qd == pytest.approx([0.0], abs=1e-9)
+    twin = EXAMPLES.parent / "benches" / "python" / "fork_control_mujoco.py"
+    ours, theirs = code(EXAMPLES / "fork_control.py"), code(twin)
+    print(f"lines: {len(ours)} and {len(theirs)} with MuJoCo; characters: {len(''.join(ours))} and {len(''.join(theirs))}")
+    assert len(ours) <= len(theirs) and len("".join(ours)) <= len("".join(theirs))
+    if importlib.util.find_spec("mujoco") is None:
+        pytest.skip("SKIPPED: MuJoCo is not installed; `make references` installs it")
+    data = runpy.run_path(str(twin))["data"]
+    assert data.time == pytest.approx(1.0) and data.qpos == pytest.approx([1.0], abs=1e-9) and data.qvel == pytest.approx([0.0], abs=1e-9)
 
 
 def test_blocks_stop_by_their_friction_whatever_their_mass(run):

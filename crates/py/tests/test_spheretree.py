@@ -135,12 +135,29 @@ def test_links_of_a_robot_are_covered_by_spheres(tmp_path):
     assert 0.8 <= loose.coverage < 1 and loose.outward.max() < a.outward.max()
 
 
+def test_a_weight_trades_coverage_for_volume_outside(tmp_path):
+    file = tmp_path / "two.urdf"
+    file.write_text(ROBOT)
+    sets = [tumble.SphereRobot.from_urdf(file, spheres=4, weight_of={"a": weight}, cache=False).links for weight in (0, 0.3, 0.6, 1)]
+    covered = [links["a"].coverage for links in sets]
+    outside = [links["a"].volume_outside / links["a"].volume for links in sets]
+    assert covered == sorted(covered) and outside == sorted(outside) and len(set(covered)) == 4
+    assert covered[-1] == 1 and outside[0] == 0 and all(links["b"].coverage == 1 for links in sets)
+    full = tumble.SphereRobot.from_urdf(file, spheres=4, cache=False).links["a"]
+    assert (full.centers == sets[-1]["a"].centers).all() and full.volume == pytest.approx(0.04, rel=5e-3)
+    assert 0 < full.mean_outward < full.outward.max()
+    least = tumble.SphereRobot.from_urdf(file, spheres=4, weight=0, coverage=0.9, cache=False).links["a"]
+    assert least.coverage >= 0.9 and least.volume_outside < full.volume_outside
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         ({"spheres": 0}, "0 spheres for a link; expected 1 to 10000"),
         ({"spheres_of": {"c": 3}}, 'no link "c" with collision geometry; the links are a, b'),
         ({"coverage": 1.5}, "a coverage of 1.5"),
+        ({"weight": 1.5}, "a weight of 1.5; expected 0"),
+        ({"weight_of": {"c": 0.5}}, 'no link "c" with collision geometry'),
         ({"max_error": 0.0}, "max_error is 0"),
     ],
 )

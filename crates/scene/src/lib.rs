@@ -97,7 +97,7 @@ pub use parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
 pub use parse::material::MaterialSpec;
 pub use parse::mesh::{MeshSource, MeshSpec};
 pub use parse::mimic::{JointMimicSpec, JointSideSpec};
-pub use parse::mount::Mounts;
+pub use parse::mount::{Mounts, facing};
 pub use parse::pair::{PairSideSpec, PairSpec};
 pub use parse::problem::{Invalid, Problem};
 pub use parse::sensor::{SensorPlaceSpec, SensorSpec};

@@ -116,6 +116,7 @@ impl TriMesh {
         let (shell, count) = shells(&mesh, &groups);
         report.shells = count;
         mesh = mesh.compacted();
+        mesh.check_size()?; // without unused vertices
         report.turned = mesh.signed_volume() < 0.0;
         if report.turned {
             mesh.flip_winding();

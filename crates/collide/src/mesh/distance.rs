@@ -31,6 +31,23 @@ pub struct ClosestPoint {
     pub triangle: usize,
 }
 
+/// A closest point whose side is not known.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nearest {
+    square: f64,
+    point: Vec3,
+    /// The piece in leaf order, and the feature of the point.
+    n: usize,
+    feature: usize,
+}
+
+impl Nearest {
+    /// Returns the distance, meters.
+    pub fn distance(&self) -> f64 {
+        self.square.sqrt()
+    }
+}
+
 /// A mesh prepared for distance queries.
 #[derive(Clone, Debug)]
 pub struct MeshDistance {
@@ -79,12 +96,30 @@ impl MeshDistance {
     /// first. Almost always that is the exact result. From the middle of a sphere all triangles are
     /// about equally far, and the result has about that distance.
     pub(crate) fn closest_approximate(&self, p: &Vec3, max_triangles: usize) -> ClosestPoint {
+        let nearest = self.nearest_among(p, max_triangles);
+        let signed_distance = self.signed(p, &nearest);
+        ClosestPoint { point: nearest.point, signed_distance, triangle: self.ids[nearest.n] as usize }
+    }
+
+    /// Returns the closest point without its side, which [`MeshDistance::signed`] finds: that takes most of the time
+    /// where a surface crosses itself.
+    pub(crate) fn nearest(&self, p: &Vec3) -> Nearest {
+        self.nearest_among(p, usize::MAX)
+    }
+
+    /// Returns the signed distance of a point whose nearest point is known, meters.
+    pub(crate) fn signed(&self, p: &Vec3, nearest: &Nearest) -> f64 {
+        let Nearest { square, point, n, feature } = *nearest;
+        let sign = if self.inside(p, &point, &self.normals[n][feature]) { -1.0 } else { 1.0 };
+        sign * square.sqrt()
+    }
+
+    fn nearest_among(&self, p: &Vec3, max_triangles: usize) -> Nearest {
         let mut best = (f64::INFINITY, Vec3::zeros(), 0, 0);
         let mut left = max_triangles;
         self.search(0, p, &mut best, &mut left);
         let (square, point, n, feature) = best;
-        let sign = if self.inside(p, &point, &self.normals[n][feature]) { -1.0 } else { 1.0 };
-        ClosestPoint { point, signed_distance: sign * square.sqrt(), triangle: self.ids[n] as usize }
+        Nearest { square, point, n, feature }
     }
 
     /// Returns the tree of boxes around the pieces of the boundary.

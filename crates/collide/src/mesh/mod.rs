@@ -116,6 +116,10 @@ impl TriMesh {
                 return Err(MeshError::IndexOutOfRange { face: n + 1, index: i64::from(v) + 1, count });
             }
         }
+        self.check_size()
+    }
+
+    fn check_size(&self) -> Result<(), MeshError> {
         let diagonal = self.diagonal();
         if diagonal < SMALLEST { Err(MeshError::TooSmall { diagonal }) } else { Ok(()) }
     }

@@ -35,16 +35,17 @@ mod verify;
 
 pub use builder::{Progress, StageCount};
 pub use cache::CachedTree;
-pub use covering::{CoveredShape, Covering, CoveringSphere};
+pub use covering::{CoveredShape, Covering, CoveringSphere, SurfacePiece};
 pub use file::{MeshId, TreeFile, TreeFileError};
 pub use levels::LevelSphere;
-pub use quality::{LevelQuality, QualitySettings};
+pub use quality::{LevelQuality, QualitySettings, SolidSamples};
 pub use select::grow_to_cover;
 pub use settings::{Builder, TreeSettings};
 pub use table::align_columns;
 
 use crate::{Aabb, MeshDistance, MeshError, TriMesh, Vec3};
 use builder::{Cell, Job, TreeBuilder, check_stopped};
+use rayon::prelude::*;
 use sphere::Sphere;
 pub(crate) use sphere::around_points;
 
@@ -195,6 +196,7 @@ impl SphereTree {
             }
             next += 1;
         }
+        let outward = leaf_errors(&cells, distance, progress);
         for n in (0..nodes.len()).rev().take_while(|_| !progress.stopped()) {
             let sphere = match cells[n] {
                 Cell::Leaf(sphere) => *sphere,
@@ -212,7 +214,7 @@ impl SphereTree {
             };
             nodes[n].center = sphere.center;
             nodes[n].radius = sphere.radius;
-            nodes[n].outward = sphere.outward(distance);
+            nodes[n].outward = outward[n].unwrap_or_else(|| sphere.outward(distance));
         }
         SphereTree::of_nodes(nodes)
     }
@@ -225,6 +227,15 @@ impl SphereTree {
             .flat_map(|n| [n.center.add_scalar(-n.radius), n.center.add_scalar(n.radius)]);
         SphereTree { bounds: Aabb::around(leaf_boxes), nodes }
     }
+}
+
+/// Returns how far each leaf extends outside the solid, meters; `None` for other cells, and if the build is stopped.
+fn leaf_errors(cells: &[&Cell], distance: &MeshDistance, progress: &dyn Progress) -> Vec<Option<f64>> {
+    let outward = |cell: &&Cell| match cell {
+        Cell::Leaf(sphere) if !progress.stopped() => Some(sphere.outward(distance)),
+        _ => None,
+    };
+    cells.par_iter().map(outward).collect()
 }
 
 fn empty_node(level: u32) -> SphereNode {

@@ -16,6 +16,8 @@
 use super::builder::{Built, Cell, Job, Progress, StageCount, TreeBuilder};
 use super::sphere::{Sphere, around_points};
 use crate::{MeshDistance, MeshError, Vec3};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Maximum number of leaves of a tree.
 const MAX_LEAVES: usize = 400_000;
@@ -24,6 +26,9 @@ const SHIFTS: [f64; 9] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.2, 4.5, 6.5];
 /// Growth of each leaf, as a fraction of its initial radius, so that neighbors overlap by more than
 /// rounding.
 const OVERLAP: f64 = 0.01;
+
+/// Depth above which the children of a cell are made on several threads.
+const PARALLEL: u32 = 3;
 
 /// A convex piece of one triangle.
 type Piece = Vec<Vec3>;
@@ -34,7 +39,7 @@ struct Context<'a> {
     target: f64,
     depth: u32,
     even: bool,
-    leaves: usize,
+    leaves: AtomicUsize,
     progress: &'a dyn Progress,
 }
 
@@ -47,31 +52,33 @@ impl TreeBuilder for Octree {
         let bounds = mesh.aabb();
         let side = (bounds.max - bounds.min).max();
         let pieces = (0..mesh.triangles.len()).map(|t| mesh.corners(t).to_vec()).collect();
-        let mut context = Context {
+        let context = Context {
             distance: job.distance,
             target: settings.error * mesh.diagonal(),
             depth: settings.depth,
             even: settings.even,
-            leaves: 0,
+            leaves: AtomicUsize::new(0),
             progress: job.progress,
         };
         let root = context.cell(pieces, 0.5 * (bounds.min + bounds.max), 0.5 * side, 0);
-        if context.leaves > MAX_LEAVES {
+        let count = context.leaves.into_inner();
+        if count > MAX_LEAVES {
             let (what, allowed) =
                 ("the number of leaves of a sphere tree", "at most 400000: lower the depth or raise the error");
-            return Err(MeshError::Settings { what, value: context.leaves as f64, allowed });
+            return Err(MeshError::Settings { what, value: (MAX_LEAVES + 1) as f64, allowed });
         }
-        let leaves = StageCount { level: settings.depth, stage: "leaves".into(), count: context.leaves as u64 };
+        let leaves = StageCount { level: settings.depth, stage: "leaves".into(), count: count as u64 };
         Ok(Built { root, stages: vec![leaves] })
     }
 }
 
 impl Context<'_> {
-    fn cell(&mut self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
+    /// Makes the cell of some pieces; its children on several threads, which changes nothing in it.
+    fn cell(&self, pieces: Vec<Piece>, center: Vec3, half: f64, depth: u32) -> Cell {
         let (mut sphere, outward) = self.tight_sphere(&pieces);
         let fine = outward <= self.target || depth == self.depth;
-        if fine || self.leaves > MAX_LEAVES || self.progress.stopped() {
-            self.leaves += 1;
+        if fine || self.leaves.load(Ordering::Relaxed) > MAX_LEAVES || self.progress.stopped() {
+            self.leaves.fetch_add(1, Ordering::Relaxed);
             // a root that is the only leaf has no neighbors to be even with
             if self.even && depth > 0 {
                 sphere.radius += (self.target - outward).max(0.0);
@@ -83,11 +90,16 @@ impl Context<'_> {
             parts = parts.into_iter().flat_map(|p| cut(p, k, center[k])).collect();
         }
         // bit 2 of the index is the side on x, bit 1 on y, bit 0 on z
-        let children = parts.into_iter().enumerate().filter(|(_, p)| !p.is_empty()).map(|(n, p)| {
+        let child = |(n, p): (usize, Vec<Piece>)| {
             let side = Vec3::from_fn(|k, _| if n >> (2 - k) & 1 == 1 { 0.5 } else { -0.5 });
             self.cell(p, center + side * half, 0.5 * half, depth + 1)
-        });
-        Cell::Inner(children.collect())
+        };
+        let parts: Vec<(usize, Vec<Piece>)> = parts.into_iter().enumerate().filter(|(_, p)| !p.is_empty()).collect();
+        Cell::Inner(if depth < PARALLEL {
+            parts.into_par_iter().map(child).collect()
+        } else {
+            parts.into_iter().map(child).collect()
+        })
     }
 
     /// Returns the tried sphere with the smallest outward error, and that error.
@@ -95,16 +107,28 @@ impl Context<'_> {
         let points: Vec<Vec3> = pieces.iter().flatten().copied().collect();
         let start = around_points(&points);
         let inward = -area_vector(pieces).try_normalize(0.0).unwrap_or_default();
-        let mut best: Option<(Sphere, f64)> = None;
-        for shift in SHIFTS {
+        let tried = SHIFTS.map(|shift| {
             let mut sphere = Sphere::about(start.center + inward * (shift * start.radius), &points);
             sphere.radius += OVERLAP * start.radius;
-            let outward = sphere.outward(self.distance);
-            if best.is_none_or(|(_, least)| outward < least) {
-                best = Some((sphere, outward));
+            sphere
+        });
+        // the side of a center is asked for only where the sphere may be the best: if it is inside
+        let near = tried.map(|sphere| self.distance.nearest(&sphere.center));
+        let least = |k: usize| (tried[k].radius - near[k].distance()).max(0.0);
+        let mut order: [usize; SHIFTS.len()] = std::array::from_fn(|k| k);
+        order.sort_by(|a, b| least(*a).total_cmp(&least(*b)));
+        let mut best = (usize::MAX, f64::INFINITY);
+        for k in order {
+            if least(k) > best.1 {
+                break;
+            }
+            let outward = (tried[k].radius + self.distance.signed(&tried[k].center, &near[k])).max(0.0);
+            // of equals the first
+            if outward < best.1 || (outward == best.1 && k < best.0) {
+                best = (k, outward);
             }
         }
-        best.unwrap_or((start, f64::INFINITY))
+        tried.get(best.0).map_or((start, f64::INFINITY), |sphere| (*sphere, best.1))
     }
 }
 

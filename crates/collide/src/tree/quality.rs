@@ -18,6 +18,7 @@
 //! bound, [`SphereTree::check_coverage`] proves coverage.
 
 mod samples;
+mod solid_samples;
 mod sphere_union;
 
 use super::SphereTree;
@@ -25,6 +26,7 @@ use super::levels::LevelSphere;
 use crate::{Aabb, MeshDistance, TriMesh, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+pub use solid_samples::SolidSamples;
 use sphere_union::SphereUnion;
 
 /// Maximum number of samples of one kind.
@@ -230,7 +232,7 @@ impl<'a> Solid<'a> {
         let corners = level.iter().flat_map(|b| [b.center.add_scalar(-b.radius), b.center.add_scalar(b.radius)]);
         let bounds = Aabb::around(corners.chain(self.mesh.vertices.iter().copied()));
         let points = samples::in_box(&bounds, self.settings.volume_samples);
-        let in_mesh = samples::inside(&self.distance, &points, &bounds);
+        let in_mesh = samples::inside(&|p| self.distance.closest(p).signed_distance, &points, &bounds);
         let in_union: Vec<bool> = points.par_iter().map(|p| union.contains(p, 0.0)).collect();
         let one = (bounds.max - bounds.min).product() / points.len() as f64 / self.volume;
         let count = |wanted: fn(bool, bool) -> bool| {

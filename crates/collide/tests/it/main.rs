@@ -2,6 +2,18 @@
 
 #![allow(clippy::disallowed_methods)] // expected numbers may come from the platform
 
+extern crate self as libfuzzer_sys;
+
+/// Replaces the macro of `libfuzzer_sys`: makes a target a function of its bytes or text.
+#[macro_export]
+macro_rules! fuzz_target {
+    (|$input:ident: &$kind:ty| $body:block) => {
+        pub fn target($input: &$kind) {
+            $body
+        }
+    };
+}
+
 mod against_parry;
 mod bad_meshes;
 mod broad;
@@ -25,6 +37,7 @@ mod pairs;
 mod primitives;
 mod quality;
 mod rays;
+mod reader_fuzz;
 mod rng;
 mod shape_cache;
 mod shared_meshes;

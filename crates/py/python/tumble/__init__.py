@@ -71,7 +71,7 @@ from tumble._native import (
     __version__,
     simulate,
 )
-from tumble._pictures import Camera, save_png
+from tumble._pictures import Appearance, Camera, save_png
 from tumble._recordings import Recording, read, replay
 from tumble._values import Energy, Event, Firing, IntersectPart, LinkSpheres, Momentum, SphereLevel
 from tumble._window import Window
@@ -81,6 +81,7 @@ Plane = HalfSpace
 __all__ = [
     "Action",
     "Animation",
+    "Appearance",
     "Articulation",
     "ArticulationBuilder",
     "Batch",

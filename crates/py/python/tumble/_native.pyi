@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, disjoint_base
 
 from tumble._extension import Behavior, Force, Intersect
+from tumble._pictures import Appearance
 from tumble._values import Energy, Event, Firing, LinkSpheres, Momentum, SphereLevel
 from tumble._window import Window
 from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, JointKind, JointType, LockedAxis, MissingMeshes, Mode, SensorKind, Solver, Stepper, TreeMethod
@@ -229,7 +230,8 @@ class HeightField(Mesh):
 class Terrain(Mesh):
     """The solid below an open surface, a ``Mesh``; for static bodies. Takes what ``Mesh`` takes; all
     faces must look up, or all down. thickness: distance that the solid reaches straight down,
-    meters; None: a tenth of the longer horizontal side.
+    meters; None: a tenth of the longer horizontal side. It is below the surface whichever way the faces look; the
+    solid of an ``OpenMesh`` is behind them, and its thickness is measured across them.
     """
     def __new__(
         cls,
@@ -245,7 +247,7 @@ class OpenMesh(Mesh):
     """The solid behind an open surface of any form, a ``Mesh``; for static bodies: rooms, walls, tunnels. Takes what
     ``Mesh`` takes; faces look to the free side, counter-clockwise seen from there. thickness: distance that the
     solid reaches behind them, meters; None: a hundredth of the diagonal. centered: whether it reaches half as far
-    to both sides instead.
+    to both sides instead. ``Terrain`` reaches straight down instead, whichever way the faces look.
     """
     def __new__(
         cls,
@@ -490,6 +492,41 @@ class RigidBody:
         """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
     @color.setter
     def color(self, value: ArrayLike) -> None: ...
+    @property
+    def appearance(self) -> Appearance:
+        """The look of its surface, a ``tumble.Appearance``. It has no effect on motion."""
+    @appearance.setter
+    def appearance(self, value: Appearance) -> None: ...
+    def attach_camera(
+        self,
+        position: ArrayLike | None = (0.0, 0.0, 0.0),
+        forward: ArrayLike | None = (1.0, 0.0, 0.0),
+        up: ArrayLike | None = (0.0, 0.0, 1.0),
+        *,
+        fov_deg: float = 40.0,
+        near: float = 0.05,
+        far: float = 500.0,
+    ) -> None:
+        """Attaches a camera, at most one, that moves with the body and that scenes keep. position: shape (3,), m; forward, up:
+        directions, shape (3,), not parallel; all in the frame of the shape. fov_deg: vertical field of view, degrees, 1 to 170.
+        near, far: depths between which it sees, m.
+        """
+    def attach_light(
+        self,
+        kind: Literal["point", "directional"] = "point",
+        *,
+        position: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        color: ArrayLike | None = None,
+        intensity: float = 1.0,
+        radius: float = 0.1,
+        casts_shadow: bool | None = None,
+    ) -> None:
+        """Attaches a light, at most one, which scenes keep. kind: ``"point"``, with radius, m, or ``"directional"``, along
+        direction, shape (3,). position: shape (3,), m. Both are in the frame of the shape. color: sRGB, shape (3,). intensity: at least 0; a
+        directional light of 1 makes a white wall that faces it white, a point light at 1 m. casts_shadow: by default of
+        directional lights.
+        """
     @property
     def gravity_scale(self) -> float:
         """Factor of the world's gravity, 1 by default."""
@@ -1401,6 +1438,7 @@ class ArticulationBuilder:
         tangential_restitution: float | None = None,
         adhesion: float | None = None,
         surface_velocity: ArrayLike | None = None,
+        appearance: Appearance | None = None,
     ) -> None:
         """Adds a link. Its joint has the same name.
 
@@ -1428,7 +1466,7 @@ class ArticulationBuilder:
         (lower, upper) of the turn of the link about that axis, rad.
 
         friction, restitution, and the other constants of surfaces, contacts, group, mask, collidable: of the shapes, as the
-        properties of ``RigidBody``. color: sRGB, shape (3,).
+        properties of ``RigidBody``. color: sRGB, shape (3,); appearance: a ``tumble.Appearance`` instead.
         """
     def add_shape(
         self,
@@ -1457,6 +1495,7 @@ class ArticulationBuilder:
         tangential_restitution: float | None = None,
         adhesion: float | None = None,
         surface_velocity: ArrayLike | None = None,
+        appearance: Appearance | None = None,
     ) -> None:
         """Adds a shape to a link. position, orientation: in the frame of the link. collidable: whether it
         collides, or is only drawn; both count for the mass. one_way: direction, shape (3,), in the frame of the shape, of a
@@ -1464,7 +1503,7 @@ class ArticulationBuilder:
         overlap it.
 
         mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, the other constants of surfaces,
-        contacts, group, mask, color: by default those of the link. visible: whether it is drawn.
+        contacts, group, mask, color: by default those of the link; appearance: a ``tumble.Appearance`` instead of the color. visible: whether it is drawn.
         """
     def mimic(self, link: str, of: str, multiplier: float = 1.0, offset: float = 0.0) -> None:
         """Couples the joint of a link to that of another: ``q = multiplier · q_of + offset``."""
@@ -2022,8 +2061,10 @@ class SphereRobot:
         *,
         spheres: int | None = None,
         spheres_of: Mapping[str, int] | None = None,
-        coverage: float = 1.0,
+        coverage: float | None = None,
         coverage_of: Mapping[str, float] | None = None,
+        weight: float | None = None,
+        weight_of: Mapping[str, float] | None = None,
         max_error: float | None = None,
         packages: Mapping[str, _Path] | None = None,
         missing_meshes: MissingMeshes = "error",
@@ -2034,7 +2075,10 @@ class SphereRobot:
 
         spheres: largest number of spheres of a link, 1 to 10,000 (default 32, with max_error 10,000);
         spheres_of: that of links by name. coverage: share of the outer surface of a link, by area, that is
-        covered at least, above 0 and at most 1; coverage_of: that of links by name. max_error: spheres that
+        covered at least, above 0 and at most 1 (default 1, with weight no bound); coverage_of: that of links by
+        name. weight: 0 (nothing outside) to 1 (full coverage): minimizes ``weight`` times the share of the surface
+        that is not covered plus ``1 - weight`` times the volume outside over that of the link (default: the set that
+        reaches the least far outside); weight_of: that of links by name. max_error: spheres that
         reach at most this far outside are not divided, as a fraction of the link's diagonal (default 0.001).
         packages: folders by name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``. method:
         the sphere trees that are tried, as in ``SphereTree.build``. cache: whether trees are kept on disk.
@@ -2956,6 +3000,7 @@ class World:
         non_spinning: bool = False,
         intersect: Intersect | None = None,
         one_way: ArrayLike | None = None,
+        appearance: Appearance | None = None,
     ) -> RigidBody:
         """Adds a body that moves.
 
@@ -2973,7 +3018,7 @@ class World:
         frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
         rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
         ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface. one_way: as
-        the property.
+        the property. appearance: a ``tumble.Appearance``, by default one of a few colors in turn.
         """
     def add_static(
         self,
@@ -2991,9 +3036,10 @@ class World:
         sensor: bool = False,
         intersect: Intersect | None = None,
         one_way: ArrayLike | None = None,
+        appearance: Appearance | None = None,
     ) -> RigidBody:
         """Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-        group, mask, sensor, intersect, one_way: as in ``add_rigid``.
+        group, mask, sensor, intersect, one_way, appearance: as in ``add_rigid``; by default gray, planes checkered.
         """
     def add_articulation(
         self, articulation: Articulation | ArticulationBuilder | _Path, base: ArrayLike | None = None, *, name: str | None = None

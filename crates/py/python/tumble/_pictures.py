@@ -29,6 +29,33 @@ class Camera(NamedTuple):
     """Vertical field of view, degrees, above 0 and below 180."""
 
 
+class Appearance(NamedTuple):
+    """What a surface looks like: ``World.add_rigid``, ``RigidBody.appearance``. Names and defaults are those of scene files."""
+
+    color: ArrayLike = (0.72, 0.72, 0.74)
+    """Main color, sRGB, shape (3,), each 0 to 1."""
+    second_color: ArrayLike = (1.0, 1.0, 1.0)
+    """The other color of a pattern."""
+    pattern: str = "plain"
+    """``"plain"``, ``"checker"``, ``"grid"``, ``"solid_ball"``, ``"striped_ball"``, ``"wood"``, ``"felt"``, ``"rings"`` or ``"marble"``."""
+    pattern_scale: float = 0.1
+    """Size of a cell of the pattern, m."""
+    pattern_offset: float = 0.0
+    """Start of the pattern along the shape's z axis, m."""
+    roughness: float = 0.5
+    """0 mirror-like to 1 dull."""
+    metallic: float = 0.0
+    """0 dielectric to 1 metal."""
+    clearcoat: float = 0.0
+    """Strength of a clear coat, 0 to 1."""
+    glow: bool = False
+    """Whether it shows its colors as they are, without light and shadow."""
+    texture: str | PathLike[str] | None = None
+    """A PNG image over the main color, which tints it."""
+    detail: str = "full"
+    """``"full"``, ``"simplified"``, ``"wireframe"`` or ``"sphere_tree=LEVEL"``."""
+
+
 def save_png(path: str | PathLike[str], picture: ArrayLike) -> None:
     """Writes an image of ``World.render``, shape (height, width, 4), uint8, as a PNG file."""
     data = encode(picture)

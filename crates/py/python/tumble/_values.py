@@ -116,6 +116,12 @@ class LinkSpheres(NamedTuple):
     """Share of the outer surface, by area, that is proved to lie inside."""
     shapes: int
     """Number of collision elements that the link had."""
+    mean_outward: float
+    """Mean by area of the distance by which the exposed surface of the spheres is outside the shapes, m. Sampled."""
+    volume: float
+    """Volume of the union of the shapes, m³. Sampled."""
+    volume_outside: float
+    """Volume of the union of the spheres outside the shapes, m³. Sampled."""
 
 
 class SphereLevel(NamedTuple):

@@ -1,7 +1,11 @@
-//! Default appearance of bodies that are added by a program.
+//! Appearance of bodies that are added by a program.
 
-use tumble::collide::Shape;
+use crate::arrays::convert::{path, some};
+use crate::errors::{Error, Result};
+use pyo3::prelude::*;
+use tumble::collide::{Shape, Vec3};
 use tumble::dynamics::{Appearance, Renderable, RigidBody as Rigid};
+use tumble::scene::{AppearanceSpec, Pattern};
 
 /// Colors that new bodies take in turn, sRGB.
 const PALETTE: [[f32; 3]; 7] = [
@@ -58,4 +62,86 @@ pub fn looking(body: Rigid, appearance: Appearance) -> Rigid {
 /// Returns the color of its first visual.
 pub fn color(body: &Rigid) -> [f64; 3] {
     body.visuals().first().map_or([0.0; 3], |visual| visual.appearance.color.map(f64::from))
+}
+
+/// Reads a `tumble.Appearance`.
+pub fn given(value: &Bound<'_, PyAny>) -> Result<AppearanceSpec> {
+    let field = |name: &str| {
+        value.getattr(name).map_err(|_| Error::value("appearance: expected a tumble.Appearance".to_owned()))
+    };
+    let number = |name: &str, low: f64, high: f64, expected: &str| -> Result<f64> {
+        let number: f64 = field(name)?.extract()?;
+        let known = number.is_finite() && number >= low && number <= high;
+        known
+            .then_some(number)
+            .ok_or_else(|| Error::value(format!("appearance.{name} is {number}; expected {expected}")))
+    };
+    let share = |name: &str| number(name, 0.0, 1.0, "0 to 1");
+    let color = |name: &str| -> Result<[f64; 3]> {
+        let color = some::<3>(&field(name)?, &format!("appearance.{name}"))?;
+        match color.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            Some(wrong) => Err(Error::value(format!("appearance.{name}: {wrong} is not from 0 to 1"))),
+            None => Ok(color),
+        }
+    };
+    let (pattern, detail): (String, String) = (field("pattern")?.extract()?, field("detail")?.extract()?);
+    let texture = field("texture")?;
+    let texture = if texture.is_none() { None } else { Some(path(&texture)?) };
+    if let Some(missing) = texture.as_ref().filter(|file| !file.is_file()) {
+        return Err(Error::value(format!(
+            "appearance.texture: there is no file {}; expected a PNG file",
+            missing.display()
+        )));
+    }
+    Ok(AppearanceSpec {
+        color: color("color")?,
+        second_color: color("second_color")?,
+        pattern: Pattern::by_name(&pattern).ok_or_else(|| {
+            let names = Pattern::names().collect::<Vec<_>>().join(", ");
+            Error::value(format!("appearance.pattern is '{pattern}'; expected one of {names}"))
+        })?,
+        pattern_scale_m: number("pattern_scale", f64::MIN_POSITIVE, f64::MAX, "a length above 0, m")?,
+        pattern_offset_m: number("pattern_offset", f64::MIN, f64::MAX, "a length, m")?,
+        roughness: share("roughness")?,
+        metallic: share("metallic")?,
+        clearcoat: share("clearcoat")?,
+        glow: field("glow")?.extract()?,
+        texture,
+        detail: detail.parse().map_err(|expected: String| {
+            Error::value(format!("appearance.detail is '{detail}'; expected {expected}"))
+        })?,
+    })
+}
+
+/// Returns a description as a `tumble.Appearance`.
+pub fn shown<'py>(py: Python<'py>, spec: &AppearanceSpec) -> Result<Bound<'py, PyAny>> {
+    let class = py.import("tumble._pictures")?.getattr("Appearance")?;
+    let color = |[r, g, b]: [f64; 3]| (r, g, b);
+    Ok(class.call1((
+        color(spec.color),
+        color(spec.second_color),
+        spec.pattern.name(),
+        spec.pattern_scale_m,
+        spec.pattern_offset_m,
+        spec.roughness,
+        spec.metallic,
+        spec.clearcoat,
+        spec.glow,
+        spec.texture.clone(),
+        spec.detail.words(),
+    ))?)
+}
+
+/// Returns the description of the first visual of a body.
+pub fn of(body: &Rigid) -> AppearanceSpec {
+    let center = body.shape().center_of_mass();
+    body.visuals()
+        .first()
+        .map_or_else(AppearanceSpec::default, |first| AppearanceSpec::of_body(&first.appearance, &center))
+}
+
+/// Returns the body with a described appearance.
+pub fn described(body: Rigid, spec: &AppearanceSpec) -> Rigid {
+    let center: Vec3 = body.shape().center_of_mass();
+    looking(body, spec.in_body(&center))
 }

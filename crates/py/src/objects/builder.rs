@@ -3,7 +3,7 @@
 use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or, whole_number};
 use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
-use crate::objects::appearance::palette;
+use crate::objects::appearance::{self, palette};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::inertia;
 use crate::objects::joints::{component, drive_at};
@@ -89,17 +89,17 @@ impl ArticulationBuilder {
     /// (lower, upper) of the turn of the link about that axis, rad.
     ///
     /// friction, restitution, and the other constants of surfaces, contacts, group, mask, collidable: of the shapes, as the
-    /// properties of ``RigidBody``. color: sRGB, shape (3,).
+    /// properties of ``RigidBody``. color: sRGB, shape (3,); appearance: a ``tumble.Appearance`` instead.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
         armature=0.0, stiffness=0.0, rest=None, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
-        twist_limits=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
+        twist_limits=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
         joint_friction=0.0, armature=0.0, stiffness=0.0, rest=0.0, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=True, color=None, cone=None, \
         contacts='surface', group=0, mask=None, twist_limits=None, static_friction=None, stribeck_speed=None, \
-        friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None)"
+        friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_link(
@@ -145,6 +145,7 @@ impl ArticulationBuilder {
         tangential_restitution: Option<f64>,
         adhesion: Option<f64>,
         surface_velocity: Option<&Bound<'_, PyAny>>,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
@@ -208,7 +209,10 @@ impl ArticulationBuilder {
             Some(color) => vec3(color, "color")?.map(|c| c as f32).into(),
             None => palette(self.builder().links().len()),
         };
-        link = link.with_appearance(Appearance { color, ..Appearance::default() });
+        link = link.with_appearance(match appearance.map(appearance::given).transpose()? {
+            Some(look) => look.in_body(&shape.as_ref().map_or_else(Vec3::zeros, |shape| shape.solid.center_of_mass())),
+            None => Appearance { color, ..Appearance::default() },
+        });
         link = with_mass(link, (mass, density), center_of_mass, inertia)?;
         if let Some(shape) = shape {
             link = with_shape(link, &shape, shape_position, shape_orientation, collidable)?;
@@ -223,9 +227,9 @@ impl ArticulationBuilder {
     /// overlap it.
     ///
     /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, the other constants of surfaces,
-    /// contacts, group, mask, color: by default those of the link. visible: whether it is drawn.
+    /// contacts, group, mask, color: by default those of the link; appearance: a ``tumble.Appearance`` instead of the color. visible: whether it is drawn.
     #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None, sensor=false, mass=None, density=None,
-        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
+        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -253,6 +257,7 @@ impl ArticulationBuilder {
         tangential_restitution: Option<f64>,
         adhesion: Option<f64>,
         surface_velocity: Option<&Bound<'_, PyAny>>,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<()> {
         self.has(link)?;
         if mass.is_some() && density.is_some() {
@@ -277,6 +282,7 @@ impl ArticulationBuilder {
         let (group, mask) =
             (group.map(query::group).transpose()?, mask.map(|mask| query::mask(Some(mask))).transpose()?);
         let color = color.map(|color| vec3(color, "color")).transpose()?;
+        let look = appearance.map(appearance::given).transpose()?;
         let pose = pose(position, orientation)? * shape.placement;
         let mut builder = self.builder();
         let Some(known) = builder.link_mut(link) else { return Ok(()) };
@@ -294,7 +300,8 @@ impl ArticulationBuilder {
         };
         let with = mass.into_iter().fold(with.with_shape_visible(visible), LinkBuilder::with_shape_mass);
         let with = density.into_iter().fold(with, LinkBuilder::with_shape_density);
-        let looks = color.map(|color| Appearance { color: color.map(|c| c as f32).into(), ..Appearance::default() });
+        let plain = color.map(|color| Appearance { color: color.map(|c| c as f32).into(), ..Appearance::default() });
+        let looks = look.map(|look| look.in_body(&shape.solid.center_of_mass())).or(plain);
         *known = looks.into_iter().fold(with, LinkBuilder::with_shape_appearance);
         Ok(())
     }

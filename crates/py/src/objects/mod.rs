@@ -18,6 +18,7 @@ pub mod joints;
 pub mod link;
 pub mod link_intersect;
 pub mod mimic;
+pub mod mounts;
 pub mod place;
 pub mod robot;
 pub mod sensor;

@@ -41,13 +41,21 @@ fn per_link<T>(common: T, links: Option<BTreeMap<String, T>>) -> PerLink<T> {
     PerLink { common, links: links.unwrap_or_default() }
 }
 
+/// Returns the values of an option that may be left out.
+fn some(links: BTreeMap<String, f64>) -> BTreeMap<String, Option<f64>> {
+    links.into_iter().map(|(link, value)| (link, Some(value))).collect()
+}
+
 #[pymethods]
 impl SphereRobot {
     /// Reads a URDF and covers the outer surface of the collision shapes of each link by spheres.
     ///
     /// spheres: largest number of spheres of a link, 1 to 10,000 (default 32, with max_error 10,000);
     /// spheres_of: that of links by name. coverage: share of the outer surface of a link, by area, that is
-    /// covered at least, above 0 and at most 1; coverage_of: that of links by name. max_error: spheres that
+    /// covered at least, above 0 and at most 1 (default 1, with weight no bound); coverage_of: that of links by
+    /// name. weight: 0 (nothing outside) to 1 (full coverage): minimizes ``weight`` times the share of the surface
+    /// that is not covered plus ``1 - weight`` times the volume outside over that of the link (default: the set that
+    /// reaches the least far outside); weight_of: that of links by name. max_error: spheres that
     /// reach at most this far outside are not divided, as a fraction of the link's diagonal (default 0.001).
     /// packages: folders by name, for ``package://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``. method:
     /// the sphere trees that are tried, as in ``SphereTree.build``. cache: whether trees are kept on disk.
@@ -56,15 +64,17 @@ impl SphereRobot {
     /// ``InvalidValueError``, ``UnreadableFileError`` or ``SceneError`` with the reason. The interpreter is released meanwhile;
     /// Ctrl-C ends the work.
     #[staticmethod]
-    #[pyo3(signature = (path, *, spheres=None, spheres_of=None, coverage=1.0, coverage_of=None, max_error=None, packages=None, missing_meshes="error", method="medial", cache=true))]
+    #[pyo3(signature = (path, *, spheres=None, spheres_of=None, coverage=None, coverage_of=None, weight=None, weight_of=None, max_error=None, packages=None, missing_meshes="error", method="medial", cache=true))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = whole_number)] spheres: Option<u32>,
         spheres_of: Option<BTreeMap<String, usize>>,
-        coverage: f64,
+        coverage: Option<f64>,
         coverage_of: Option<BTreeMap<String, f64>>,
+        weight: Option<f64>,
+        weight_of: Option<BTreeMap<String, f64>>,
         max_error: Option<f64>,
         packages: Option<BTreeMap<String, PathBuf>>,
         missing_meshes: &str,
@@ -80,7 +90,8 @@ impl SphereRobot {
         let tree = settings(meaning("method", method, BUILDERS)?, None, None, None);
         let options = SphereOptions {
             most: per_link(most, spheres_of),
-            coverage: per_link(coverage, coverage_of),
+            coverage: per_link(coverage, coverage_of.map(some)),
+            weight: per_link(weight, weight_of.map(some)),
             error,
             tree: TreeSettings { error: tree.error.min(error), even: false, ..tree },
             cache: if cache { TreeCache::of_environment() } else { TreeCache::off() },
@@ -116,12 +127,17 @@ impl SphereRobot {
     fn links<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyDict>> {
         let class = py.import("tumble._values")?.getattr("LinkSpheres")?;
         let links = PyDict::new(py);
-        for LinkSpheres { name, shapes, spheres, outward, coverage } in &self.robot.links {
+        for link in &self.robot.links {
+            let LinkSpheres { name, shapes, spheres, outward, coverage, .. } = link;
+            let sampled = (link.mean_outward, link.volume, link.volume_outside);
             let centers: Vec<f64> = spheres.iter().flat_map(|(c, _)| [c.x, c.y, c.z]).collect();
             let centers: Bound<'py, PyArray2<f64>> = PyArray1::from_vec(py, centers).reshape([spheres.len(), 3])?;
             let radii = PyArray1::from_iter(py, spheres.iter().map(|(_, radius)| *radius));
             let outward = PyArray1::from_slice(py, outward);
-            links.set_item(name, class.call1((centers, radii, outward, *coverage, *shapes))?)?;
+            links.set_item(
+                name,
+                class.call1((centers, radii, outward, *coverage, *shapes, sampled.0, sampled.1, sampled.2))?,
+            )?;
         }
         Ok(links)
     }

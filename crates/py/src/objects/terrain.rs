@@ -132,7 +132,8 @@ impl HeightField {
 
 /// The solid below an open surface, a ``Mesh``; for static bodies. Takes what ``Mesh`` takes; all
 /// faces must look up, or all down. thickness: distance that the solid reaches straight down,
-/// meters; None: a tenth of the longer horizontal side.
+/// meters; None: a tenth of the longer horizontal side. It is below the surface whichever way the faces look; the
+/// solid of an ``OpenMesh`` is behind them, and its thickness is measured across them.
 #[pyclass(frozen, extends = Mesh, module = "tumble")]
 pub struct Terrain;
 
@@ -157,7 +158,7 @@ impl Terrain {
 /// The solid behind an open surface of any form, a ``Mesh``; for static bodies: rooms, walls, tunnels. Takes what
 /// ``Mesh`` takes; faces look to the free side, counter-clockwise seen from there. thickness: distance that the
 /// solid reaches behind them, meters; None: a hundredth of the diagonal. centered: whether it reaches half as far
-/// to both sides instead.
+/// to both sides instead. ``Terrain`` reaches straight down instead, whichever way the faces look.
 #[pyclass(frozen, extends = Mesh, module = "tumble")]
 pub struct OpenMesh;
 

@@ -76,12 +76,17 @@ pub fn add(
     mode: Mode,
     collidable: bool,
     intersect: Option<&Bound<'_, PyAny>>,
+    look: Option<&Bound<'_, PyAny>>,
 ) -> Result<RigidBody> {
+    let look = look.map(appearance::given).transpose()?;
     if let Some(test) = intersect {
         py.import("tumble._extension")?.call_method1("check_intersect", (test,))?;
     }
     let place = shared.write(py, |inner| {
-        let body = appearance::usual(body, inner.world.ids().len());
+        let body = match &look {
+            Some(look) => appearance::described(body, look),
+            None => appearance::usual(body, inner.world.ids().len()),
+        };
         let id = inner.world.add_boxed(Box::new(body), mode)?;
         inner.world.set_collidable(id, collidable)?;
         let name = inner.world.name(id).unwrap_or_default().into();

@@ -2,7 +2,7 @@
 //! a set of others, or beside chains along the axes of capsules, with the same number for each link.
 //!
 //! ```sh
-//! cargo run --release -p tumble-scene --example robot_spheres -- ROBOT.urdf SPHERES.urdf|SPHERES.yml
+//! cargo run --release -p tumble-scene --example robot_spheres -- ROBOT.urdf SPHERES.urdf|SPHERES.yml [WEIGHT]
 //! cargo run --release -p tumble-scene --example robot_spheres -- ROBOT.urdf COUNT…
 //! ```
 //!
@@ -33,15 +33,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let counts: Vec<usize> = rest.iter().filter_map(|word| word.parse().ok()).collect();
     println!(
-        "| link | spheres | covered % | outside max mm | mean mm | volume | covered % | max mm | mean mm | volume |"
+        "| link | spheres | covered % | outside max mm | mean mm | volume outside | covered % | max mm | mean mm | volume outside |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    if counts.is_empty() {
+    if counts.len() < rest.len() || rest.is_empty() {
         let others = read_spheres(Path::new(rest.first().ok_or("expected spheres, or counts")?))?;
-        return compare(path, folder, &robot.links, &others, false);
+        let weight = rest.get(1).map(|word| word.parse()).transpose()?;
+        return compare(path, folder, &robot.links, &others, false, weight);
     }
     for count in counts {
-        compare(path, folder, &robot.links, &capsule_chains(&robot.links, count), true)?;
+        compare(path, folder, &robot.links, &capsule_chains(&robot.links, count), true, None)?;
     }
     Ok(())
 }
@@ -53,6 +54,7 @@ fn compare(
     links: &[Link],
     others: &[(String, Set)],
     full: bool,
+    weight: Option<f64>,
 ) -> Result<(), Box<dyn Error>> {
     let bodies: Vec<(&str, &Set, Body)> = others
         .iter()
@@ -63,7 +65,8 @@ fn compare(
     let theirs: Vec<Figures> = bodies.iter().map(|(_, set, body)| body.measure(set)).collect();
     let mut options = SphereOptions {
         most: PerLink::all(1),
-        coverage: PerLink::all(1.0),
+        coverage: PerLink::all(None),
+        weight: PerLink::all(weight),
         error: 1e-9,
         tree: TreeSettings { error: 1e-4, even: false, ..TreeSettings::default() },
         cache: TreeCache::of_environment(),
@@ -72,14 +75,15 @@ fn compare(
     for ((name, set, _), figures) in bodies.iter().zip(&theirs) {
         options.most.links.insert((*name).into(), set.len());
         let coverage = if full { 1.0 } else { figures.covered.clamp(1e-3, 1.0) };
-        options.coverage.links.insert((*name).into(), coverage);
+        options.coverage.links.insert((*name).into(), Some(coverage));
     }
     let mut ours = measured(path, &options, &bodies)?;
     for _ in 0..if full { 0 } else { PASSES } {
         // the fit counts pieces that lie in one sphere, the measure all points in any
         for (((name, ..), theirs), ours) in bodies.iter().zip(&theirs).zip(&ours) {
-            let coverage = options.coverage.links.entry((*name).into()).or_insert(1.0);
-            *coverage = (*coverage - 0.7 * (ours.covered - theirs.covered)).clamp(1e-3, 1.0);
+            let coverage = options.coverage.of(name).unwrap_or(1.0);
+            let next = (coverage - 0.7 * (ours.covered - theirs.covered)).clamp(1e-3, 1.0);
+            options.coverage.links.insert((*name).into(), Some(next));
         }
         for ((ours, next), theirs) in ours.iter_mut().zip(measured(path, &options, &bodies)?).zip(&theirs) {
             if next.covered >= theirs.covered {
@@ -87,14 +91,17 @@ fn compare(
             }
         }
     }
-    let mut sums = [0.0_f64; 4];
+    let mut sums = [0.0_f64; 6];
     for (((name, set, _), theirs), ours) in bodies.iter().zip(&theirs).zip(&ours) {
         println!("| {name} | {} | {} | {} |", set.len(), theirs.cells(), ours.cells());
-        for (sum, value) in sums.iter_mut().zip([theirs.worst, theirs.mean, ours.worst, ours.mean]) {
+        for (sum, value) in
+            sums.iter_mut().zip([theirs.worst, theirs.mean, theirs.outside, ours.worst, ours.mean, ours.outside])
+        {
             *sum += 1e3 * value;
         }
     }
-    println!("| sum | | | {:.2} | {:.2} | | | {:.2} | {:.2} | |", sums[0], sums[1], sums[2], sums[3]);
+    let [a, b, c, d, e, f] = sums;
+    println!("| sum | | | {a:.2} | {b:.2} | {:.3} | | {d:.2} | {e:.2} | {:.3} |", 1e-3 * c, 1e-3 * f);
     Ok(())
 }
 
@@ -126,17 +133,17 @@ struct Body {
     volume: f64,
 }
 
-/// Lengths in meters, volume as a fraction of that of the link.
+/// Lengths in meters, volume outside as a fraction of the volume of the link.
 struct Figures {
     covered: f64,
     worst: f64,
     mean: f64,
-    volume: f64,
+    outside: f64,
 }
 
 impl Figures {
     fn cells(&self) -> String {
-        format!("{:.2} | {:.2} | {:.2} | {:.2}", 100.0 * self.covered, 1e3 * self.worst, 1e3 * self.mean, self.volume)
+        format!("{:.2} | {:.2} | {:.2} | {:.3}", 100.0 * self.covered, 1e3 * self.worst, 1e3 * self.mean, self.outside)
     }
 }
 
@@ -191,7 +198,8 @@ impl Body {
             }
         }
         let (low, high) = bounds(set.iter().copied());
-        Figures { covered, worst, mean: sum / f64::max(area, 1e-300), volume: volume(low, high, holds) / self.volume }
+        let outside = volume(low, high, |p| holds(p) && self.distance(p) > 0.0) / self.volume;
+        Figures { covered, worst, mean: sum / f64::max(area, 1e-300), outside }
     }
 }
 

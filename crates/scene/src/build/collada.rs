@@ -19,8 +19,13 @@ use tumble_core::collide::{PolygonTriangulator, TriMesh, Vec3};
 
 /// Largest number of nodes of a document.
 const MAX_NODES: u32 = 20_000_000;
-/// Largest number of triangles of a document; every instance counts.
+/// Largest number of triangles, and of vertices, of a document; every instance counts. So does its length: a short
+/// document may not make more than `FREE` of them, beside `PER_BYTE` for each byte.
 const MAX_TRIANGLES: usize = 20_000_000;
+const FREE: usize = 1_000_000;
+const PER_BYTE: usize = 10;
+/// Largest number of nodes that are walked through, with instances of nodes, beside one for each byte.
+const FREE_NODES: usize = 100_000;
 /// Largest depth of nested nodes.
 const DEEPEST: usize = 64;
 
@@ -33,7 +38,9 @@ pub(crate) fn read(text: &str) -> Result<TriMesh, String> {
         return Err(format!("the outermost element is <{}>; a COLLADA document has <COLLADA>", root.tag_name().name()));
     }
     let ids = root.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect();
-    let mut reader = Reader { ids, geometries: BTreeMap::new(), made: TriMesh::default() };
+    let most = MAX_TRIANGLES.min(FREE + PER_BYTE * text.len());
+    let nodes = FREE_NODES + text.len();
+    let mut reader = Reader { ids, geometries: BTreeMap::new(), made: TriMesh::default(), most, nodes, left: nodes };
     let unit =
         descendant(root, "unit").and_then(|unit| unit.attribute("meter")).map_or(Ok(1.0), |m| number(m).ok_or(m));
     let unit = unit.map_err(|m| format!("`meter` of <unit> is \"{m}\"; it must be a number"))?;
@@ -91,6 +98,11 @@ struct Reader<'a, 'd> {
     /// Geometries read so far, by the number of their element.
     geometries: BTreeMap<u32, Geometry>,
     made: TriMesh,
+    /// Largest number of triangles and of vertices.
+    most: usize,
+    /// Largest number of nodes that are walked through, and how many of them are left.
+    nodes: usize,
+    left: usize,
 }
 
 impl<'a, 'd> Reader<'a, 'd> {
@@ -122,6 +134,10 @@ impl<'a, 'd> Reader<'a, 'd> {
     }
 
     fn node(&mut self, node: Node<'a, 'd>, pose: &Matrix4<f64>, depth: usize) -> Result<(), String> {
+        self.left = self
+            .left
+            .checked_sub(1)
+            .ok_or_else(|| fault(node, format_args!("is one of more than {} nodes, instances included", self.nodes)))?;
         let mut pose = *pose;
         for step in node.children().filter(Node::is_element) {
             pose *= transform(step)?;
@@ -137,8 +153,13 @@ impl<'a, 'd> Reader<'a, 'd> {
             self.geometries.insert(key, read);
         }
         let (vertices, triangles) = &self.geometries[&key];
-        if self.made.triangles.len() + triangles.len() > MAX_TRIANGLES {
-            return Err(fault(geometry, format_args!("makes more than {MAX_TRIANGLES} triangles in all")));
+        for (count, what) in [
+            (self.made.triangles.len() + triangles.len(), "triangles"),
+            (self.made.vertices.len() + vertices.len(), "vertices"),
+        ] {
+            if count > self.most {
+                return Err(fault(geometry, format_args!("makes more than {} {what} in all", self.most)));
+            }
         }
         let first = self.made.vertices.len() as u32;
         let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
@@ -189,6 +210,9 @@ impl<'a, 'd> Reader<'a, 'd> {
                 }
             }
             vertices.extend(points);
+            if vertices.len() > self.most {
+                return Err(fault(primitive, format_args!("makes more than {} vertices in all", self.most)));
+            }
         }
         Ok((vertices, triangles))
     }

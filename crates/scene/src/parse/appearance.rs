@@ -46,6 +46,16 @@ impl Pattern {
 }
 
 impl Pattern {
+    /// Returns the pattern of a name in files.
+    pub fn by_name(name: &str) -> Option<Pattern> {
+        Pattern::NAMES.iter().find(|(known, _)| *known == name).map(|(_, pattern)| *pattern)
+    }
+
+    /// Returns the names in files.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Pattern::NAMES.iter().map(|(name, _)| *name)
+    }
+
     /// Returns its name in files, which is also the name of its shader.
     pub fn name(self) -> &'static str {
         Pattern::NAMES.iter().find(|(_, pattern)| *pattern == self).map_or("plain", |(name, _)| *name)

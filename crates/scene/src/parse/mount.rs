@@ -96,7 +96,7 @@ fn read_light(mut f: Fields<'_>) -> Option<LightMount> {
 
 /// Returns the pose at a position with x along `forward` and z as close to `up` as possible; `None`
 /// if the two are parallel.
-fn facing(position: [f64; 3], ahead: [f64; 3], up: [f64; 3]) -> Option<Pose> {
+pub fn facing(position: [f64; 3], ahead: [f64; 3], up: [f64; 3]) -> Option<Pose> {
     let x = Vec3::from(ahead).try_normalize(1e-9)?;
     let y = Vec3::from(up).cross(&x).try_normalize(1e-6)?;
     let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, x.cross(&y)]));

@@ -7,11 +7,13 @@
 //! worse. So the better one of the two never extends further with more spheres.
 
 use tumble_core::collide::{
-    Builder, CoveredShape, Covering, CoveringSphere, Pose, SphereTree, TreeSettings, TriMesh, Vec3,
+    Builder, CoveredShape, Covering, CoveringSphere, Pose, SolidSamples, SphereTree, TreeSettings, TriMesh, Vec3,
 };
 
 use super::chain::{Chain, chains};
+use super::solid::Solid;
 use super::spheres::SphereOptions;
+use super::weigh;
 
 /// Sides of the prism of a round shape.
 const SIDES: usize = 64;
@@ -50,26 +52,83 @@ pub(super) struct Fit {
     pub coverage: f64,
 }
 
+/// How much is covered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aim {
+    /// Least share of the outer surface, by area.
+    pub coverage: f64,
+    /// Weight of coverage against tightness ([`weigh`]); `None` takes the tightest set.
+    pub weight: Option<f64>,
+}
+
 /// Returns spheres around the shapes of a link, at most `most`.
 ///
 /// # Errors
 /// A tree cannot be built.
-pub(super) fn fit(forms: &[Form], most: usize, coverage: f64, options: &SphereOptions) -> Result<Fit, String> {
+pub(super) fn fit(forms: &[Form], most: usize, aim: Aim, options: &SphereOptions) -> Result<Fit, String> {
     let members = Members::of(forms);
-    let union = CoveredShape::union(&members.shapes);
-    let enough = options.error * union.diagonal();
-    let by_formula = ByFormula::new(&members, coverage, most);
+    let Some(weight) = aim.weight else { return Ok(tightest(&members, most, aim.coverage, options)?.0) };
+    let (full, covering) = tightest(&members, most, 1.0, options)?;
+    if weight >= 1.0 || full.spheres.iter().all(|sphere| sphere.outward <= 0.0) {
+        return Ok(full);
+    }
+    let covering = match covering {
+        Some(covering) => covering,
+        None => grown(&members, most, 1.0, options)?.covering,
+    };
+    let solid = Solid::of(forms);
+    let distance = |p: &Vec3| solid.distance(p);
+    let samples = SolidSamples::new(solid.bounds(), covering.worst() + members.slack(), &distance);
+    let fitted = |one: weigh::Candidate<Vec<CoveringSphere>>| {
+        let spheres = one.spheres.into_iter().map(|sphere| members.fitted(sphere)).collect();
+        weigh::Candidate {
+            spheres: Fit { spheres, coverage: 1.0 - one.uncovered },
+            uncovered: one.uncovered,
+            outside: one.outside,
+        }
+    };
+    let balls: Vec<(Vec3, f64)> = full.spheres.iter().map(|s| (s.center, s.radius)).collect();
+    let outside = samples.volume_outside(&balls) / samples.volume();
+    let mut candidates = vec![weigh::Candidate { uncovered: 1.0 - full.coverage, outside, spheres: full }];
+    candidates.extend(weigh::candidates(covering, aim.coverage, &samples).into_iter().map(fitted));
+    weigh::best(candidates, weight).map(|best| best.spheres).ok_or_else(|| "it has no sphere".into())
+}
+
+/// Returns the spheres that reach the least far outside and cover the share `coverage`, and the covering
+/// of all shapes together if it has as many.
+fn tightest(
+    members: &Members,
+    most: usize,
+    coverage: f64,
+    options: &SphereOptions,
+) -> Result<(Fit, Option<Covering>), String> {
+    let enough = options.error * CoveredShape::union(&members.shapes).diagonal();
+    let by_formula = ByFormula::new(members, coverage, most);
     let by_formula = by_formula.map(|set| set.grown(most, enough, options)).transpose()?;
     if let Some(set) = &by_formula
         && (set.worst() <= 0.0 || coverage >= 1.0 && set.is_one_chain())
     {
-        return Ok(set.fit(&members));
+        return Ok((set.fit(members), None));
     }
+    let fewer = if coverage >= 1.0 { most.min(members.most_together()) } else { most };
+    let whole = grown(members, fewer, coverage, options)?;
+    let worst = whole.covering.worst() + members.slack();
+    let order = |worst: f64, count: usize| if worst <= enough { (enough, count) } else { (worst, 0) };
+    let fit = match by_formula {
+        Some(set) if order(set.worst(), set.count()) <= order(worst, whole.covering.count()) => set.fit(members),
+        _ => Fit { spheres: whole.spheres(members), coverage: whole.covering.coverage() },
+    };
+    Ok((fit, (fewer == most).then_some(whole.covering)))
+}
+
+/// Returns a covering of all shapes together, of at most `most` spheres.
+fn grown(members: &Members, most: usize, coverage: f64, options: &SphereOptions) -> Result<Refined, String> {
+    let union = CoveredShape::union(&members.shapes);
+    let enough = options.error * union.diagonal();
     let Some(covering) = Covering::new(&members.shapes, coverage) else {
         return Err("its shapes hide each other's surface".into());
     };
     let mut whole = Refined::new(covering, union);
-    let most = if coverage >= 1.0 { most.min(members.most_together()) } else { most };
     while whole.covering.count() < most && whole.wants_more(enough) {
         whole.add(enough, options)?;
         let count = whole.covering.count();
@@ -77,12 +136,7 @@ pub(super) fn fit(forms: &[Form], most: usize, coverage: f64, options: &SphereOp
             whole.covering.suggest(&members.centers(count), count);
         }
     }
-    let worst = whole.covering.worst() + members.slack();
-    let order = |worst: f64, count: usize| if worst <= enough { (enough, count) } else { (worst, 0) };
-    match by_formula {
-        Some(set) if order(set.worst(), set.count()) <= order(worst, whole.covering.count()) => Ok(set.fit(&members)),
-        _ => Ok(Fit { spheres: whole.spheres(&members), coverage: whole.covering.coverage() }),
-    }
+    Ok(whole)
 }
 
 /// The shapes of a link, with a capsule for each chain.
@@ -117,6 +171,12 @@ impl Members {
     /// stand for.
     fn slack(&self) -> f64 {
         self.chains.iter().map(|chain| 2.0 * chain.deviation).fold(0.0, f64::max)
+    }
+
+    /// Returns a sphere of a covering as one of the link.
+    fn fitted(&self, s: CoveringSphere) -> FittedSphere {
+        let outward = s.outward + self.slack();
+        FittedSphere { center: s.center, radius: s.radius, outward, shape: self.origins[s.shape], exact: false }
     }
 
     /// Returns the number of spheres up to which all shapes are covered together. Chains gain more
@@ -225,14 +285,7 @@ impl Refined {
     }
 
     fn spheres(&self, members: &Members) -> Vec<FittedSphere> {
-        let fitted = |s: CoveringSphere| FittedSphere {
-            center: s.center,
-            radius: s.radius,
-            outward: s.outward + members.slack(),
-            shape: members.origins[s.shape],
-            exact: false,
-        };
-        self.covering.spheres().map(fitted).collect()
+        self.covering.spheres().map(|sphere| members.fitted(sphere)).collect()
     }
 
     fn add(&mut self, enough: f64, options: &SphereOptions) -> Result<(), String> {
@@ -282,7 +335,7 @@ impl Form {
     }
 
     /// Returns the shape as a mesh. The corners of round shapes lie on their surface.
-    fn covered(&self) -> CoveredShape {
+    pub(super) fn covered(&self) -> CoveredShape {
         match self {
             Form::Capsule { radius, .. } => self.rounded(*radius),
             Form::Cylinder { radius, length, pose } => CoveredShape {

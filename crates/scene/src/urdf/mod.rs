@@ -34,8 +34,10 @@ mod load;
 mod options;
 mod read;
 mod self_collision;
+mod solid;
 mod spheres;
 mod tree;
+mod weigh;
 
 pub use error::UrdfError;
 pub use load::{UrdfModel, load, model, parse_model};

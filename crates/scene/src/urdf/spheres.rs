@@ -19,11 +19,12 @@ use roxmltree::Node;
 use tumble_core::collide::{MeshError, Progress, RepairSettings, TreeCache, TreeSettings, TriMesh, Vec3};
 
 use super::error::UrdfError;
-use super::fit::{Fit, FittedSphere, Form, fit, placed};
+use super::fit::{Aim, Fit, FittedSphere, Form, fit, placed};
 use super::link::{Context, read_shape};
 use super::options::UrdfOptions;
 use super::read::{Content, read_text, text_of};
 use super::self_collision::{self, TreeLink};
+use super::solid::{Figures, Solid};
 use crate::build::mesh_files::{read_file, stretched};
 use crate::notes::NoteList;
 use crate::parse::link::{Geometry, LinkShape};
@@ -40,8 +41,12 @@ const ROUNDING: f64 = 1e-9;
 pub struct SphereOptions {
     /// Largest number of spheres of a link, 1 to 10,000.
     pub most: PerLink<usize>,
-    /// Share of the outer surface of a link that is covered at least, by area: above 0, at most 1.
-    pub coverage: PerLink<f64>,
+    /// Share of the outer surface of a link that is covered at least, by area: above 0, at most 1. `None`
+    /// is 1 without a weight, and no bound with one.
+    pub coverage: PerLink<Option<f64>>,
+    /// Weight of coverage against volume outside the link, 0 to 1: 1 covers all, less leaves out what costs
+    /// more volume outside than it covers. `None` takes the set that reaches the least far outside.
+    pub weight: PerLink<Option<f64>>,
     /// Spheres that extend at most this far outside a link are not divided: a fraction of the
     /// link's diagonal.
     pub error: f64,
@@ -105,8 +110,15 @@ pub struct LinkSpheres {
     /// Upper bound of the distance by which each extends outside the shapes of the link, meters.
     pub outward: Vec<f64>,
     /// Share of the outer surface, by area, that is proved to lie inside the spheres: 1, or with a
-    /// smaller [`SphereOptions::coverage`] that of the pieces that lie in one sphere.
+    /// smaller [`SphereOptions::coverage`] or a weight that of the pieces that lie in one sphere.
     pub coverage: f64,
+    /// Mean by area of the distance by which the exposed surface of the spheres is outside the shapes of
+    /// the link, meters; 0 where it is inside. Sampled.
+    pub mean_outward: f64,
+    /// Volume of the union of the shapes, m³. Sampled.
+    pub volume: f64,
+    /// Volume of the union of the spheres outside the shapes, m³. Sampled.
+    pub volume_outside: f64,
 }
 
 /// A collision element, and its shape in the frame of the link.
@@ -150,9 +162,12 @@ pub fn spherize(
         let parts = parts(link, &mut context).map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
         if !parts.is_empty() {
             let (nodes, forms): (Vec<Node>, Vec<Form>) = parts.into_iter().map(|part| (part.node, part.form)).unzip();
-            let fit = fit(&forms, options.most.of(&name), options.coverage.of(&name), options)
+            let weight = options.weight.of(&name);
+            let coverage = options.coverage.of(&name).unwrap_or(if weight.is_some() { 0.0 } else { 1.0 });
+            let fit = fit(&forms, options.most.of(&name), Aim { coverage, weight }, options)
                 .map_err(|why| wrong(format!("link \"{name}\": {why}")))?;
-            links.push(written(name, &nodes, &fit, &text, &mut edits).map_err(wrong)?);
+            let figures = Solid::of(&forms).measure(&fit.spheres);
+            links.push(written(name, &nodes, &fit, &figures, &text, &mut edits).map_err(wrong)?);
         }
         progress.report((n + 1) as f64 / elements.len() as f64);
     }
@@ -174,10 +189,14 @@ fn check_links(elements: &[Element<'_, '_>], options: &SphereOptions) -> Result<
     if let Some(most) = options.most.values().find(|most| !(1..=MAX_SPHERES).contains(*most)) {
         return Err(format!("{most} spheres for a link; expected 1 to {MAX_SPHERES}"));
     }
-    if let Some(coverage) = options.coverage.values().find(|share| !(**share > 0.0 && **share <= 1.0)) {
+    if let Some(coverage) = options.coverage.values().flatten().find(|share| !(**share > 0.0 && **share <= 1.0)) {
         return Err(format!("a coverage of {coverage}; expected a share above 0 and at most 1"));
     }
-    match options.most.links.keys().chain(options.coverage.links.keys()).find(|link| !names.contains(&link.as_str())) {
+    if let Some(weight) = options.weight.values().flatten().find(|weight| !(0.0..=1.0).contains(*weight)) {
+        return Err(format!("a weight of {weight}; expected 0 (no volume outside) to 1 (full coverage)"));
+    }
+    let mut named = options.most.links.keys().chain(options.coverage.links.keys()).chain(options.weight.links.keys());
+    match named.find(|link| !names.contains(&link.as_str())) {
         Some(link) => {
             Err(format!("there is no link \"{link}\" with collision geometry; the links are {}", names.join(", ")))
         }
@@ -247,11 +266,20 @@ fn written(
     name: String,
     nodes: &[Node<'_, '_>],
     fit: &Fit,
+    figures: &Figures,
     text: &str,
     edits: &mut Vec<(Range<usize>, String)>,
 ) -> Result<LinkSpheres, String> {
-    let mut link =
-        LinkSpheres { name, shapes: nodes.len(), spheres: Vec::new(), outward: Vec::new(), coverage: fit.coverage };
+    let mut link = LinkSpheres {
+        name,
+        shapes: nodes.len(),
+        spheres: Vec::new(),
+        outward: Vec::new(),
+        coverage: fit.coverage,
+        mean_outward: figures.mean_outward,
+        volume: figures.volume,
+        volume_outside: figures.volume_outside,
+    };
     for (shape, node) in nodes.iter().enumerate() {
         let own = || fit.spheres.iter().filter(|sphere| sphere.shape == shape);
         let more = |s: &FittedSphere| if s.exact { 0.0 } else { ROUNDING * (s.radius + s.center.norm()) };

@@ -1,5 +1,17 @@
 //! Tests of `tumble-scene`.
 
+extern crate self as libfuzzer_sys;
+
+/// Replaces the macro of `libfuzzer_sys`: makes a target a function of its bytes or text.
+#[macro_export]
+macro_rules! fuzz_target {
+    (|$input:ident: &$kind:ty| $body:block) => {
+        pub fn target($input: &$kind) {
+            $body
+        }
+    };
+}
+
 mod articulated;
 mod articulated_settings;
 mod articulated_world;
@@ -26,6 +38,7 @@ mod names;
 mod npy;
 mod on_floor;
 mod pinocchio;
+mod reader_fuzz;
 mod repair;
 mod robots;
 mod robust;
@@ -43,3 +56,4 @@ mod terrain;
 mod threads;
 mod urdf;
 mod visuals;
+mod weigh;

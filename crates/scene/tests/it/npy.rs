@@ -5,7 +5,7 @@ use tumble_core::collide::{TriMesh, Vec3};
 use tumble_scene::read_grid;
 
 /// A generator of random numbers (xorshift).
-struct Rng(u64);
+pub(crate) struct Rng(pub u64);
 
 impl Rng {
     fn next(&mut self) -> u64 {
@@ -15,7 +15,7 @@ impl Rng {
         self.0
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n.max(1) as u64) as usize
     }
 }

@@ -80,7 +80,8 @@ fn options(most: usize) -> SphereOptions {
     let tree = TreeSettings { depth: 4, ..TreeSettings::octree() };
     SphereOptions {
         most: PerLink::all(most),
-        coverage: PerLink::all(1.0),
+        coverage: PerLink::all(None),
+        weight: PerLink::all(None),
         error: 1e-3,
         tree,
         cache: TreeCache::off(),
@@ -435,7 +436,7 @@ fn less_coverage_is_tighter_and_as_stated() {
     let folder = Folder::new("coverage", ROBOT);
     let mut last = 0.0;
     for coverage in [0.5, 0.8, 0.95, 1.0] {
-        let robot = folder.spherize(&SphereOptions { coverage: PerLink::all(coverage), ..options(8) }).unwrap();
+        let robot = folder.spherize(&SphereOptions { coverage: PerLink::all(Some(coverage)), ..options(8) }).unwrap();
         let link = &robot.links[0];
         let worst = link.outward.iter().copied().fold(0.0, f64::max);
         // even samples of the box, the cylinder and the sphere of the arm, by area
@@ -484,7 +485,7 @@ fn links_have_numbers_of_their_own() {
     let error = refused(options(0));
     assert!(error.contains("0 spheres for a link; expected 1 to 10000"), "{error}");
     for coverage in [0.0, 1.1, f64::NAN] {
-        let error = refused(SphereOptions { coverage: PerLink::all(coverage), ..options(8) });
+        let error = refused(SphereOptions { coverage: PerLink::all(Some(coverage)), ..options(8) });
         assert!(error.contains("expected a share above 0 and at most 1"), "{error}");
     }
 }

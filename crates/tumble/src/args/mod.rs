@@ -293,6 +293,12 @@ pub struct SphereTreeOptions {
     /// (default); LINK=SHARE for one link. May be given several times. Less is tighter.
     #[arg(long, help_heading = "Robots", value_name = "SHARE|LINK=SHARE", requires = "urdf", value_parser = per_link::<f64>)]
     pub coverage: Vec<(Option<String>, f64)>,
+    /// Weight of coverage against volume outside the link, 0 (nothing outside) to 1 (full coverage);
+    /// LINK=WEIGHT for one link. May be given several times. Minimizes weight times the share of the
+    /// surface that is not covered plus (1 - weight) times the volume outside over that of the link,
+    /// with at least --coverage if that is given.
+    #[arg(long, help_heading = "Robots", value_name = "WEIGHT|LINK=WEIGHT", requires = "urdf", value_parser = per_link::<f64>)]
+    pub weight: Vec<(Option<String>, f64)>,
     /// Print the links whose spheres overlap at these positions of joints (rad, m; the others at 0 or
     /// at the limit next to it); `zero` names none. May be given several times. The pose is taken to
     /// be free: --planner yaml lists its pairs under self_collision_ignore.

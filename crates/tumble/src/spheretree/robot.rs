@@ -24,12 +24,15 @@ const DEFAULT_MAX_ERROR: f64 = 1e-3;
 pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure> {
     let common = if options.max_error.is_some() { MAX_SPHERES_FOR_ERROR } else { DEFAULT_MAX_SPHERES };
     let most = per_link(&options.spheres, common);
-    let coverage = per_link(&options.coverage, 1.0);
+    let [coverage, weight] = [&options.coverage, &options.weight].map(|given| {
+        per_link(&given.iter().map(|(link, value)| (link.clone(), Some(*value))).collect::<Vec<_>>(), None)
+    });
     let error = options.max_error.unwrap_or(DEFAULT_MAX_ERROR);
     let settings = super::settings(options);
     let how = SphereOptions {
         most,
         coverage,
+        weight,
         error,
         tree: tumble::collide::TreeSettings { error: settings.error.min(error), even: false, ..settings },
         cache: super::cache(options),
@@ -101,10 +104,23 @@ fn planner_file(path: &Path, options: &SphereTreeOptions) -> Result<Option<(Path
     Ok(Some((file, ending != "json")))
 }
 
+/// Returns how far the spheres of a link reach outside it at most, meters.
+fn worst(link: &LinkSpheres) -> f64 {
+    link.outward.iter().copied().fold(0.0, f64::max)
+}
+
+/// Returns the volume outside as a fraction of that of the link.
+fn outside(link: &LinkSpheres) -> f64 {
+    if link.volume_outside > 0.0 { link.volume_outside / link.volume } else { 0.0 }
+}
+
+/// Returns a share in percent, rounded down to three digits.
+fn percent(share: f64) -> f64 {
+    1e5_f64.mul_add(share, 1e-9).floor() / 1e3
+}
+
 fn table(robot: &SphereRobot) -> String {
-    let heads = ["link", "shapes", "spheres", "outside max mm", "outside mean mm", "covered %"];
-    let worst = |link: &LinkSpheres| link.outward.iter().copied().fold(0.0, f64::max);
-    let mean = |link: &LinkSpheres| link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
+    let heads = ["link", "shapes", "spheres", "outside max mm", "outside mean mm", "volume outside %", "covered %"];
     let row = |link: &LinkSpheres| {
         let (shapes, spheres) = (link.shapes.to_string(), link.spheres.len().to_string());
         vec![
@@ -112,8 +128,9 @@ fn table(robot: &SphereRobot) -> String {
             shapes,
             spheres,
             format!("{:.2}", 1e3 * worst(link)),
-            format!("{:.2}", 1e3 * mean(link)),
-            format!("{:.3}", 1e5_f64.mul_add(link.coverage, 1e-9).floor() / 1e3),
+            format!("{:.2}", 1e3 * link.mean_outward),
+            format!("{:.2}", 1e2 * outside(link)),
+            format!("{:.3}", percent(link.coverage)),
         ]
     };
     let rows = std::iter::once(heads.map(str::to_owned).to_vec()).chain(robot.links.iter().map(row));
@@ -186,7 +203,15 @@ fn sample_table(robot: &SphereRobot, samples: &[JointPositions], ignored: &[[usi
 fn planner_yaml(robot: &SphereRobot, ignored: &[[usize; 2]]) -> String {
     let mut text = format!("robot: {}\ncollision_spheres:\n", Value::from(robot.name.as_str()));
     for link in &robot.links {
-        _ = writeln!(text, "  {}:", Value::from(link.name.as_str()));
+        _ = writeln!(
+            text,
+            "  # covered {:.3} %; outside at most {:.2} mm, mean {:.2} mm, volume {:.2} %\n  {}:",
+            percent(link.coverage),
+            1e3 * worst(link),
+            1e3 * link.mean_outward,
+            1e2 * outside(link),
+            Value::from(link.name.as_str())
+        );
         for (c, radius) in &link.spheres {
             _ = writeln!(
                 text,
@@ -224,7 +249,7 @@ fn float(x: f64) -> String {
 fn planner_json(robot: &SphereRobot) -> String {
     let sphere = |(c, radius): &(tumble::collide::Vec3, f64)| json!({"origin": [c.x, c.y, c.z], "radius": radius});
     let link = |link: &LinkSpheres| {
-        let worst = link.outward.iter().copied().fold(0.0, f64::max);
+        let worst = worst(link);
         let best = link.outward.iter().copied().fold(f64::INFINITY, f64::min);
         let mean = link.outward.iter().sum::<f64>() / link.outward.len().max(1) as f64;
         json!({"mean": mean, "best": best.min(worst), "worst": worst, "spheres": link.spheres.iter().map(sphere).collect::<Vec<_>>()})

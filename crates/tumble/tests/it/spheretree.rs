@@ -120,7 +120,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let (nowhere, here) = (text(&folder.path("nowhere/tree.json")), text(&folder.path("")));
     let bare = folder.write("bare.urdf", "<robot name=\"r\"><link name=\"a\"/></robot>");
     let gone = folder.write("gone.urdf", GONE);
-    let cases: [(&[&str], &str); 22] = [
+    let cases: [(&[&str], &str); 24] = [
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
@@ -143,6 +143,14 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         (&["--urdf", &robot, "--spheres", "c=4"], "there is no link \"c\" with collision geometry; the links are a, b"),
         (&["--urdf", &robot, "--spheres", "b=many"], "expected a number, or LINK=NUMBER"),
         (&["--urdf", &robot, "--coverage", "0"], "expected a share above 0 and at most 1"),
+        (
+            &["--urdf", &robot, "--weight", "1.5"],
+            "a weight of 1.5; expected 0 (no volume outside) to 1 (full coverage)",
+        ),
+        (
+            &["--urdf", &robot, "--weight", "c=0.5"],
+            "there is no link \"c\" with collision geometry; the links are a, b",
+        ),
         (&["--urdf", &robot, "--pose", "j"], "expected zero, or JOINT=POSITION"),
         (&["--urdf", &robot, "--pose", "k=1"], "there is no joint \"k\" to set; the joints are j"),
         (&["--urdf", &robot, "--planner", "yaml"], "needs --output, or a file such as --planner robot.yaml"),
@@ -233,7 +241,11 @@ fn a_robot_of_spheres_is_written_with_the_lists_for_planners() {
             "self_collision_buffer:\n  \"a\": 0.0\n  \"b\": 0.0\n".to_string(),
         ])
         .collect();
-    assert_eq!(std::fs::read_to_string(yaml).unwrap(), wanted);
+    let written = std::fs::read_to_string(yaml).unwrap();
+    let (comments, rest): (Vec<&str>, Vec<&str>) = written.lines().partition(|line| line.trim_start().starts_with('#'));
+    assert_eq!(rest.join("\n") + "\n", wanted);
+    let starts = comments.iter().filter(|line| line.starts_with("  # covered 100.000 %; outside at most ")).count();
+    assert_eq!([comments.len(), starts], [2, 2], "the figures of each link");
     // the corners of the box are inside: 0.1 across, 0 and 1 along
     for corner in 0..8 {
         let p = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { [0.1, 0.1, 1.0][k] } else { [-0.1, -0.1, 0.0][k] });
@@ -270,9 +282,38 @@ fn counts_coverage_and_self_collision_are_said() {
         line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
     };
     assert_eq!(row("a")[2], "3", "{said}");
-    let covered: f64 = row("a")[5].parse().unwrap();
-    assert!((80.0..100.0).contains(&covered) && row("b")[5] == "100.000", "{said}");
+    let covered: f64 = row("a")[6].parse().unwrap();
+    assert!((80.0..100.0).contains(&covered) && row("b")[6] == "100.000", "{said}");
     assert!(said.contains("4 spheres; covered: the share by area"), "{said}");
     assert!(said.contains("pose 1: 1 pair of links overlap") && said.contains("adjacent"), "{said}");
     assert!(said.contains("0 of 20 sampled poses collide, 1 pair of links ignored"), "{said}");
+}
+
+#[test]
+fn a_weight_is_said_with_its_figures() {
+    let folder = Folder::new("spheretree-weight");
+    let robot = folder.write("robot.urdf", ROBOT);
+    let yaml = folder.path("spheres.yml").display().to_string();
+    let figures = |weight: &str| -> [f64; 4] {
+        let weight = format!("a={weight}");
+        let words =
+            ["spheretree", "--no-cache", "--urdf", &robot, "--spheres", "3", "--weight", &weight, "--planner", &yaml];
+        let said = succeed(&words);
+        let line = said.lines().find(|line| line.trim_start().starts_with("a ")).unwrap();
+        let cells: Vec<f64> = line.split_whitespace().skip(3).map(|cell| cell.parse().unwrap()).collect();
+        let [worst, mean, outside, covered] = cells[..] else { panic!("{said}") };
+        // the same figures are a comment of the link
+        let text = std::fs::read_to_string(&yaml).unwrap();
+        let comment = format!(
+            "  # covered {covered:.3} %; outside at most {worst:.2} mm, mean {mean:.2} mm, volume {outside:.2} %\n  \"a\":\n"
+        );
+        assert!(text.contains(&comment), "{comment}{text}");
+        [worst, mean, outside, covered]
+    };
+    let sets = ["0", "0.5", "1"].map(figures);
+    assert_eq!(sets[0][..3], [0.0; 3]);
+    assert_eq!(sets[2][3], 100.0);
+    for pair in sets.windows(2) {
+        assert!(pair[0].iter().zip(&pair[1]).all(|(less, more)| less < more), "{sets:?}");
+    }
 }

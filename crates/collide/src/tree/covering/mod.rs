@@ -26,8 +26,8 @@ use super::nelder_mead::nelder_mead;
 use super::sphere::{SEARCH_TRIANGLES, Sphere, around_points};
 use crate::{Mat3, MeshDistance, Vec3};
 use nalgebra::SymmetricEigen;
-pub use pieces::CoveredShape;
-use pieces::{Piece, outer_pieces};
+use pieces::outer_pieces;
+pub use pieces::{CoveredShape, SurfacePiece};
 use rayon::prelude::*;
 
 /// Maximum number of pieces.
@@ -70,9 +70,10 @@ const ROUNDING: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub struct Covering {
     distance: MeshDistance,
-    pieces: Vec<Piece>,
+    pieces: Vec<SurfacePiece>,
     spheres: Vec<PieceSphere>,
-    /// Area that may be left uncovered, m².
+    /// Area of the outer surface, and the part of it that may be left uncovered, m².
+    area: f64,
     spare: f64,
     small: f64,
     /// Longest side of a piece at the rim of the covered surface, meters.
@@ -113,10 +114,11 @@ impl Covering {
         if pieces.is_empty() {
             return None;
         }
-        let spare = (1.0 - coverage) * pieces.iter().map(Piece::area).sum::<f64>();
+        let area = pieces.iter().map(SurfacePiece::area).sum::<f64>();
+        let spare = (1.0 - coverage) * area;
         let [small, rim] = [MIN_PIECE, RIM].map(|share| share * union.diagonal());
         let mut covering =
-            Covering { distance: MeshDistance::new(&union), spheres: Vec::new(), spare, small, rim, pieces };
+            Covering { distance: MeshDistance::new(&union), spheres: Vec::new(), area, spare, small, rim, pieces };
         covering.spheres = vec![covering.fit_sphere((0..covering.pieces.len() as u32).collect(), &[])];
         covering.rebalance();
         Some(covering)
@@ -128,14 +130,48 @@ impl Covering {
         if self.spare <= 0.0 {
             return 1.0;
         }
-        let covered =
-            |piece: &Piece| self.spheres.iter().any(|entry| piece.reach(&entry.sphere.center) <= entry.sphere.radius);
+        let covered = |piece: &SurfacePiece| {
+            self.spheres.iter().any(|entry| piece.reach(&entry.sphere.center) <= entry.sphere.radius)
+        };
         let areas: Vec<(f64, f64)> = self
             .pieces
             .par_iter()
             .map(|piece| (piece.area(), if covered(piece) { piece.area() } else { 0.0 }))
             .collect();
         areas.iter().map(|a| a.1).sum::<f64>() / areas.iter().map(|a| a.0).sum::<f64>()
+    }
+
+    /// Lets the spheres cover less: at least the share `coverage` of the outer surface, above 0 and at most
+    /// that of before. They reach no further outside. Does nothing for a larger share.
+    pub fn loosen(&mut self, coverage: f64) {
+        let spare = (1.0 - coverage) * self.area;
+        if spare > self.spare {
+            self.spare = spare;
+            self.rebalance();
+            self.improve();
+        }
+    }
+
+    /// Halves the pieces in spheres, the longest first, until there are `count` in all, if they can be halved:
+    /// what is covered is known more exactly then.
+    pub fn split_pieces(&mut self, count: usize) {
+        let longest = |piece: &SurfacePiece| piece.halves().0;
+        let mut size = self.pieces.iter().map(longest).fold(0.0, f64::max);
+        while self.pieces.len() < count && size > self.small {
+            size *= 0.7;
+            (0..self.count()).for_each(|k| _ = self.halve_pieces(k, size));
+        }
+    }
+
+    /// Returns the pieces of the outer surface.
+    pub fn pieces(&self) -> &[SurfacePiece] {
+        &self.pieces
+    }
+
+    /// Returns the signed distance of a point to the union of the shapes, negative inside, meters. Round
+    /// shapes are the meshes that stand for them.
+    pub fn signed_distance(&self, point: &Vec3) -> f64 {
+        self.distance.closest(point).signed_distance
     }
 
     /// Returns the number of spheres.
@@ -246,7 +282,7 @@ impl Covering {
     fn most_dispensable(&self) -> Option<(f64, usize)> {
         let depths = self.depths(self.spheres.iter().map(|entry| entry.sphere.center));
         let need_elsewhere = |k: usize| {
-            let other = |piece: &Piece| {
+            let other = |piece: &SurfacePiece| {
                 let needs = (0..self.count())
                     .filter(|j| *j != k)
                     .map(|j| piece.reach(&self.spheres[j].sphere.center) + depths[j]);
@@ -331,7 +367,7 @@ impl Covering {
     /// of a small sphere. The search knows the outermost pieces in some directions and those that
     /// its results left out; needs are of all pieces.
     fn fit_sphere(&self, pieces: Vec<u32>, tried: &[Vec3]) -> PieceSphere {
-        let own: Vec<Piece> = pieces.iter().map(|n| self.pieces[*n as usize]).collect();
+        let own: Vec<SurfacePiece> = pieces.iter().map(|n| self.pieces[*n as usize]).collect();
         let mut outermost = outermost(&own);
         let start = around_points(&outermost.iter().flat_map(|piece| piece.corners).collect::<Vec<Vec3>>());
         let mut best = (f64::INFINITY, start);
@@ -367,7 +403,7 @@ impl Covering {
     }
 
     /// Returns the least need of pieces that a search from a center finds, and its center.
-    fn search(&self, pieces: &[Piece], from: Vec3, step: f64) -> (f64, Vec3) {
+    fn search(&self, pieces: &[SurfacePiece], from: Vec3, step: f64) -> (f64, Vec3) {
         let mut best = (f64::INFINITY, from);
         nelder_mead(from, step, EVALUATIONS, |c| {
             let reach = pieces.iter().map(|piece| piece.reach(c)).fold(0.0, f64::max);
@@ -510,12 +546,13 @@ impl Covering {
 }
 
 /// Returns the pieces that are outermost in some directions.
-fn outermost(pieces: &[Piece]) -> Vec<Piece> {
+fn outermost(pieces: &[SurfacePiece]) -> Vec<SurfacePiece> {
     let signs = [-1.0, 0.0, 1.0];
     let directions = signs.iter().flat_map(|x| signs.iter().flat_map(move |y| signs.map(|z| Vec3::new(*x, *y, z))));
-    let mut outermost: Vec<Piece> = Vec::new();
+    let mut outermost: Vec<SurfacePiece> = Vec::new();
     for direction in directions {
-        let height = |piece: &Piece| piece.corners.iter().map(|p| p.dot(&direction)).fold(f64::NEG_INFINITY, f64::max);
+        let height =
+            |piece: &SurfacePiece| piece.corners.iter().map(|p| p.dot(&direction)).fold(f64::NEG_INFINITY, f64::max);
         let farthest = pieces.iter().map(|piece| (height(piece), piece)).reduce(|a, b| if b.0 > a.0 { b } else { a });
         if let Some((_, piece)) = farthest.filter(|one| !outermost.contains(one.1)) {
             outermost.push(*piece);

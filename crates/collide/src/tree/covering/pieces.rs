@@ -51,22 +51,24 @@ impl CoveredShape {
     }
 }
 
-/// A piece of the surface.
+/// A piece of the outer surface of a union of shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Piece {
+pub struct SurfacePiece {
+    /// Corners of the triangle, meters, in the frame of the shapes.
     pub corners: [Vec3; 3],
+    /// Largest distance of the surface that it stands for from the triangle, meters.
     pub bulge: f64,
     /// Index of its shape.
     pub shape: u32,
 }
 
-impl Piece {
-    /// Returns the radius of the smallest sphere about a center that contains the piece.
+impl SurfacePiece {
+    /// Returns the radius of the smallest sphere about a center that contains the piece, meters.
     pub fn reach(&self, center: &Vec3) -> f64 {
         self.corners.iter().map(|p| (p - center).norm_squared()).fold(0.0, f64::max).sqrt() + self.bulge
     }
 
-    pub fn middle(&self) -> Vec3 {
+    pub(super) fn middle(&self) -> Vec3 {
         self.corners.iter().sum::<Vec3>() / 3.0
     }
 
@@ -77,19 +79,23 @@ impl Piece {
     }
 
     /// Returns the length of the longest side, and the two halves.
-    pub fn halves(&self) -> (f64, [Piece; 2]) {
+    pub(super) fn halves(&self) -> (f64, [SurfacePiece; 2]) {
         let (size, halves) = halves_of(&self.corners);
-        (size, halves.map(|corners| Piece { corners, ..*self }))
+        (size, halves.map(|corners| SurfacePiece { corners, ..*self }))
     }
 }
 
 /// Returns the outer surface of the shapes that are to be covered, in pieces.
-pub(super) fn outer_pieces(shapes: &[CoveredShape], diagonal: f64) -> Vec<Piece> {
-    let all: Vec<Piece> = (0..shapes.len())
+pub(super) fn outer_pieces(shapes: &[CoveredShape], diagonal: f64) -> Vec<SurfacePiece> {
+    let all: Vec<SurfacePiece> = (0..shapes.len())
         .filter(|k| shapes[*k].covered)
         .flat_map(|k| {
             let CoveredShape { given, bulge, .. } = &shapes[k];
-            (0..given.triangles.len()).map(move |t| Piece { corners: given.corners(t), bulge: *bulge, shape: k as u32 })
+            (0..given.triangles.len()).map(move |t| SurfacePiece {
+                corners: given.corners(t),
+                bulge: *bulge,
+                shape: k as u32,
+            })
         })
         .collect();
     if shapes.len() == 1 {
@@ -108,7 +114,7 @@ pub(super) fn outer_pieces(shapes: &[CoveredShape], diagonal: f64) -> Vec<Piece>
 }
 
 /// Adds the parts of a piece that may be outside the other shapes.
-fn keep_outer(piece: Piece, others: &[&MeshDistance], small: f64, outer: &mut Vec<Piece>) {
+fn keep_outer(piece: SurfacePiece, others: &[&MeshDistance], small: f64, outer: &mut Vec<SurfacePiece>) {
     let middle = piece.middle();
     let size = piece.reach(&middle);
     let mut near = Vec::new();
@@ -130,7 +136,7 @@ fn keep_outer(piece: Piece, others: &[&MeshDistance], small: f64, outer: &mut Ve
 }
 
 /// Halves the longest pieces until the initial number is reached.
-fn split(pieces: Vec<Piece>) -> Vec<Piece> {
+fn split(pieces: Vec<SurfacePiece>) -> Vec<SurfacePiece> {
     let mut heap: BinaryHeap<Longest> =
         pieces.into_iter().enumerate().map(|(n, piece)| Longest::new(piece, n)).collect();
     while heap.len() < INITIAL_PIECES {
@@ -149,11 +155,11 @@ fn split(pieces: Vec<Piece>) -> Vec<Piece> {
 struct Longest {
     size: f64,
     number: usize,
-    piece: Piece,
+    piece: SurfacePiece,
 }
 
 impl Longest {
-    fn new(piece: Piece, number: usize) -> Longest {
+    fn new(piece: SurfacePiece, number: usize) -> Longest {
         Longest { size: piece.halves().0, number, piece }
     }
 }

@@ -4,7 +4,7 @@
 //! `x^(d+1) = x + 1`: Roberts, *The unreasonable effectiveness of quasirandom sequences* (2018). On
 //! a sphere the Fibonacci lattice: `z = 1 − 2(n + ½)/N`, longitude by the golden angle.
 
-use crate::{Aabb, MeshDistance, TriMesh, Vec3};
+use crate::{Aabb, TriMesh, Vec3};
 use nalgebra::ComplexField;
 use std::f64::consts::PI;
 
@@ -63,21 +63,23 @@ fn step(n: usize, alpha: f64) -> f64 {
 /// Returns which of the points lie inside the solid. If the center of a cell is further from the
 /// surface than its corners, all its points are inside or all are outside. Other cells are halved
 /// along the three axes until few points are left.
-pub(super) fn inside(distance: &MeshDistance, points: &[Vec3], bounds: &Aabb) -> Vec<bool> {
+///
+/// `distance` is the signed distance, negative inside, or less than that by magnitude.
+pub(super) fn inside(distance: &dyn Fn(&Vec3) -> f64, points: &[Vec3], bounds: &Aabb) -> Vec<bool> {
     let mut answer = vec![false; points.len()];
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     classify(distance, points, &mut order, *bounds, &mut answer);
     answer
 }
 
-fn classify(distance: &MeshDistance, points: &[Vec3], order: &mut [u32], cell: Aabb, answer: &mut [bool]) {
+fn classify(distance: &dyn Fn(&Vec3) -> f64, points: &[Vec3], order: &mut [u32], cell: Aabb, answer: &mut [bool]) {
     if order.len() <= MAX_CELL_POINTS {
-        order.iter().for_each(|&n| answer[n as usize] = distance.closest(&points[n as usize]).signed_distance < 0.0);
+        order.iter().for_each(|&n| answer[n as usize] = distance(&points[n as usize]) < 0.0);
         return;
     }
     let half = 0.5 * (cell.max - cell.min);
     let center = cell.min + half;
-    let d = distance.closest(&center).signed_distance;
+    let d = distance(&center);
     if d.abs() > half.norm() {
         order.iter().for_each(|&n| answer[n as usize] = d < 0.0);
         return;

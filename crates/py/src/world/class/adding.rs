@@ -38,9 +38,9 @@ impl World {
     /// frame of the shape, shape (3,), m; gravity_scale, locked: as the properties of a body. non_spinning: locks all
     /// rotations, so that forces and impulses act on the center of mass alone. intersect: an object of a subclass of
     /// ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface. one_way: as
-    /// the property.
+    /// the property. appearance: a ``tumble.Appearance``, by default one of a few colors in turn.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None, one_way=None))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None, one_way=None, appearance=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -70,6 +70,7 @@ impl World {
         non_spinning: bool,
         intersect: Option<&Bound<'_, PyAny>>,
         one_way: Option<&Bound<'_, PyAny>>,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
@@ -101,12 +102,12 @@ impl World {
         }
         let mut body = body.with_velocity(motion[0]).with_angular_velocity(motion[1]);
         body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
-        add(&self.shared, py, body, mode, collidable, intersect)
+        add(&self.shared, py, body, mode, collidable, intersect, appearance)
     }
 
     /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
-    /// group, mask, sensor, intersect, one_way: as in ``add_rigid``.
-    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None, one_way=None))]
+    /// group, mask, sensor, intersect, one_way, appearance: as in ``add_rigid``; by default gray, planes checkered.
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None, one_way=None, appearance=None))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
@@ -124,6 +125,7 @@ impl World {
         sensor: bool,
         intersect: Option<&Bound<'_, PyAny>>,
         one_way: Option<&Bound<'_, PyAny>>,
+        appearance: Option<&Bound<'_, PyAny>>,
     ) -> Result<RigidBody> {
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
@@ -135,7 +137,7 @@ impl World {
             .with_groups(query::group(group)?, query::mask(mask)?)
             .with_sensor(sensor);
         body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
-        add(&self.shared, py, body, Mode::Static, collidable, intersect)
+        add(&self.shared, py, body, Mode::Static, collidable, intersect, appearance)
     }
 
     /// Adds an articulated body and returns its handle.
