@@ -90,7 +90,7 @@ pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough:
         let mut simplex: ArrayVec<Vertex, 4> =
             nearest.iter().flat_map(|nearest| nearest.vertices.iter().map(|(vertex, _)| *vertex)).collect();
         if simplex.is_full() {
-            break; // the origin is inside, but for rounding
+            break; // the origin is inside, except for rounding
         }
         simplex.push(Vertex { w, points });
         let next = nearest_of(&simplex);
