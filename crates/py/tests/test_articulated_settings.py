@@ -223,3 +223,71 @@ def test_a_joint_and_its_first_degree_of_freedom_are_one():
     with pytest.raises(ValueError):
         joint.damping = -1
     assert joint.damping == 0.5
+
+
+def test_shapes_of_links_have_filters_in_a_world(tmp_path):
+    builder = tumble.ArticulationBuilder("arm")
+    parts = tumble.Compound([(tumble.Sphere(0.1), (0.5, 0, 0)), (tumble.Sphere(0.1), (-0.5, 0, 0))])
+    builder.add_link("l", axis=(0, 1, 0), shape=parts, mass=1)
+    builder.add_shape("l", tumble.Sphere(0.1), (0, 0.5, 0))
+    world = tumble.World(gravity=(0, 0, 0))
+    arm = world.add_articulation(builder)
+    assert arm.shape_filter("l", 0) == {"group": 0, "mask": 2**64 - 1, "sensor": False}
+    arm.set_shape_filter("l", 0, sensor=True)
+    arm.set_shape_filter("l", 2, group=3, mask=[1])
+    assert arm.shape_filter("l", 0)["sensor"] and not arm.shape_filter("l", 1)["sensor"]
+    assert arm.shape_filter("l", 2) == {"group": 3, "mask": 2, "sensor": False}
+    down = [world.cast_rays((x, y, 1), (0, 0, -1))["body"] for x, y in ((0.5, 0), (-0.5, 0), (0, 0.5))]
+    assert [int(found) >= 0 for found in down] == [False, True, False]
+    world.save_scene(tmp_path / "s.toml")
+    for copy in (world.fork(), tumble.World.load(tmp_path / "s.toml")):
+        assert [copy["arm"].shape_filter("l", n) for n in range(3)] == [arm.shape_filter("l", n) for n in range(3)]
+    arm.set_shape_filter("l", 0)
+    assert not arm.shape_filter("l", 0)["sensor"]
+    with pytest.raises(ValueError, match="no shape 3"):
+        arm.set_shape_filter("l", 3, sensor=True)
+    box = world.add_rigid("pair", parts, mass=1, position=(5, 0, 0))
+    for wrong in (lambda: box.set_shape_filter(2, sensor=True), lambda: box.shape_filter(2)):
+        with pytest.raises(ValueError, match="no part 2"):
+            wrong()
+
+
+def test_a_spherical_joint_takes_vectors():
+    world = tumble.World(gravity=(0, 0, 0))
+    ball = world.add_rigid("ball", tumble.Sphere(0.1), mass=1)
+    joint = world.add_joint("spherical", ball, rest=(0.1, 0.2, 0.3), stiffness=2, drive={"target": (0.3, 0.2, 0.1), "stiffness": 3})
+    assert [dof.rest for dof in joint.dofs] == [0.1, 0.2, 0.3]
+    assert [dof.stiffness for dof in joint.dofs] == [2, 2, 2]
+    for wrong in ({"rest": (1, 2)}, {"drive": {"target": (1, 2), "stiffness": 1}}):
+        with pytest.raises(ValueError, match="shape"):
+            world.add_joint("spherical", ball, stiffness=1, **wrong)
+    with pytest.raises(ValueError, match="rest: expected a number"):
+        world.add_joint("revolute", ball, stiffness=1, rest=(1, 2, 3))
+
+
+def test_turns_of_a_hinge_are_in_the_text_of_a_scene(tmp_path):
+    world = tumble.World(gravity=(0, 0, 0))
+    wheel = world.add_rigid("wheel", tumble.Cylinder(0.2, 0.3), mass=4, angular_velocity=(0, 0, -15))
+    hinge = world.add_joint("revolute", wheel, limits=(-np.inf, 1), name="hinge")
+    world.step(480)
+    assert hinge.position == pytest.approx(-30, abs=1e-6)
+    world.save_scene(tmp_path / "s.toml")
+    text = (tmp_path / "s.toml").read_text()
+    (tmp_path / "s.toml").write_text("# changed\n" + text)
+    assert tumble.World.load(tmp_path / "s.toml")["hinge"].position == pytest.approx(-30, abs=1e-6)
+    other = tumble.World()
+    body = other.add_rigid("b", tumble.Sphere(0.1), mass=1)
+    assert other.add_joint("revolute", body, limits=(-np.inf, 1), angle=-30).position == pytest.approx(-10 * np.pi)
+    with pytest.raises(ValueError, match="angle: expected"):
+        other.add_joint("revolute", body, limits=(-1, 1), angle=-30)
+
+
+@pytest.mark.parametrize("moments", [(1, 1, 5), (1, -1, 1)])
+def test_an_inertia_that_no_link_has_is_refused(moments):
+    builder = tumble.ArticulationBuilder("arm")
+    with pytest.raises(ValueError, match="principal moments"):
+        builder.add_link("l", mass=1, center_of_mass=(0, 0, 0), inertia=moments)
+    builder.add_link("l", mass=1, center_of_mass=(0, 0, 0), inertia=(0, 1, 1))
+    arm = tumble.World().add_articulation(builder)
+    with pytest.raises(ValueError, match="principal moments"):
+        arm.link("l").inertia = moments

@@ -80,6 +80,27 @@ def test_an_appearance_can_be_changed_and_reaches_links(tmp_path):
     tumble.World.load(tmp_path / "saved.toml")
 
 
+def test_a_link_carries_a_camera_and_a_light(tmp_path):
+    builder = tumble.ArticulationBuilder("arm")
+    builder.add_link("upper", axis=(0, 1, 0), shape=tumble.Box((0.1, 0.1, 0.4)), mass=1, position=(0, 0, 1))
+    builder.add_link("hand", "upper", joint="fixed", shape=tumble.Sphere(0.05), mass=0.1, position=(0, 0, -0.3))
+    world = tumble.World()
+    arm = world.add_articulation(builder)
+    arm.link("hand").attach_camera((0, 0, -0.1), (0, 0, -1), (1, 0, 0), fov_deg=60)
+    arm.link("upper").attach_light(position=(0.1, 0, 0), intensity=3)
+    for again in (lambda: arm.link("upper").attach_camera(), lambda: arm.link("hand").attach_light()):
+        with pytest.raises(ValueError, match="at most one"):
+            again()
+    world.save_scene(tmp_path / "saved.toml")
+    text = (tmp_path / "saved.toml").read_text()
+    assert text.count("camera") == 1 and text.count("light") == 1, text
+    tumble.World.load(tmp_path / "saved.toml").save_scene(tmp_path / "again.toml")
+    assert (tmp_path / "again.toml").read_text() == text
+    for copy in (world.fork(), pickle.loads(pickle.dumps(world))):
+        copy.save_scene(tmp_path / "copy.toml")
+        assert (tmp_path / "copy.toml").read_text() == text
+
+
 def test_a_light_and_a_glow_are_seen():
     world = tumble.World()
     world.add_static("wall", tumble.Box((2, 0.1, 2)), position=(0, 1, 0), appearance=tumble.Appearance(color=(1, 1, 1)))

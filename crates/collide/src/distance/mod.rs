@@ -88,7 +88,7 @@ fn parts<'a>(shape: &'a Shape, pose: &Pose) -> Vec<Part<'a>> {
     let part = |shape: &'a Shape, pose: Pose, number| Part { shape, pose, number, bounds: shape.tight_aabb(&pose) };
     match shape {
         Shape::Compound(compound) => {
-            (0..).zip(compound.placed()).map(|(number, (shape, own))| part(shape, pose * own, number)).collect()
+            compound.active_parts().map(|(n, shape, own)| part(shape, pose * own, n as u32)).collect()
         }
         _ => vec![part(shape, *pose, 0)],
     }

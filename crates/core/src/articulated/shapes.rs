@@ -6,7 +6,7 @@
 use super::body::{ArticulatedBody, ArticulatedError};
 use super::collider::Collider;
 use crate::BodyError;
-use crate::object::{Intersect, Material};
+use crate::object::{Intersect, Material, ShapeFilter};
 use crate::rigid::check_shape_name;
 use std::sync::Arc;
 use tumble_collide::{Shape, Vec3};
@@ -66,6 +66,48 @@ impl ArticulatedBody {
         match (is_compound(&found.collider.shape), material) {
             (true, material) => found.collider.shape_materials.set(shape, material),
             (false, Some(material)) => found.collider.material = material,
+            (false, None) => {}
+        }
+        Ok(())
+    }
+
+    /// Returns what a shape collides with, for the part and the index that contacts report; `None` if there is none.
+    pub fn shape_filter(&self, part: usize, shape: usize) -> Option<ShapeFilter> {
+        let collider = &self.collider(part)?.collider;
+        let whole = ShapeFilter { group: collider.group, mask: collider.mask, sensor: collider.sensor };
+        let own = collider.shape_filters.get(shape);
+        (shape < collider.shape.part_count()).then(|| own.unwrap_or(whole))
+    }
+
+    /// Sets what a shape collides with: a part of a compound, where `None` gives it the filter of the compound again, or a
+    /// whole collider, which `None` leaves.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::Collider`] if there is no such shape, or it is a part of a compound that collides on one side only.
+    /// Nothing is changed then.
+    pub fn set_shape_filter(
+        &mut self,
+        part: usize,
+        shape: usize,
+        filter: Option<ShapeFilter>,
+    ) -> Result<(), ArticulatedError> {
+        let frame = self.frame_of(part).and_then(|frame| self.model.frames().get(frame));
+        let (body, link) = (self.name.clone(), frame.map(|frame| frame.name.clone()).unwrap_or_default());
+        let fits = |collider: &Collider| {
+            let whole = !is_compound(&collider.shape) || collider.one_way.is_none();
+            shape < collider.shape.part_count() && whole
+        };
+        let Some(found) = self.collider_mut(part).filter(|found| fits(&found.collider)) else {
+            let expected = "below the number of parts of a collider that collides on all sides";
+            let why = BodyError::Range { what: "index of a shape", value: shape as f64, expected };
+            return Err(ArticulatedError::Collider { body, link, why });
+        };
+        let collider = &mut found.collider;
+        match (is_compound(&collider.shape), filter) {
+            (true, filter) => collider.shape_filters.set(shape, filter),
+            (false, Some(ShapeFilter { group, mask, sensor })) => {
+                (collider.group, collider.mask, collider.sensor) = (group, mask, sensor);
+            }
             (false, None) => {}
         }
         Ok(())

@@ -119,7 +119,10 @@ impl DofState<'_> {
                 RowTarget { velocity: aim, compliance, share, ..RowTarget::new(set(*limit), 0.0) }
             }
             Drive::Velocity { target, limit } => {
-                RowTarget { velocity: self.within_limits(level, *target), ..RowTarget::new(set(*limit), 0.0) }
+                // a drive of any strength must not fight with the limit of the velocity
+                let most = self.settings.max_velocity;
+                let velocity = self.within_limits(level, target.max(-most).min(most));
+                RowTarget { velocity, ..RowTarget::new(set(*limit), 0.0) }
             }
             Drive::Playback { motion, limit } if limit.is_infinite() => {
                 let (position, velocity) = motion.at(time);

@@ -33,7 +33,7 @@ use crate::world::World;
 use crate::world::view::{ObjectId, WorldView};
 use std::f64::consts::TAU;
 
-/// Largest denominator of a multiplier between two angles without limits.
+/// Largest denominator and numerator of a multiplier between two angles without limits.
 const MAX_DENOMINATOR: u32 = 1000;
 
 /// A joint with one position.
@@ -257,11 +257,13 @@ fn wraps(joint: JointRef, view: &WorldView) -> bool {
     view.get::<LoopJoint>(id).is_some_and(|joint| joint.kind().turns() && joint.dof().limits.is_none())
 }
 
-/// Returns the smallest whole number up to [`MAX_DENOMINATOR`] whose product with `ratio` is whole to rounding.
+/// Returns the smallest whole number up to [`MAX_DENOMINATOR`] whose product with `ratio` is whole to rounding, and at most as
+/// large.
 fn denominator(ratio: f64) -> Option<u32> {
     (1..=MAX_DENOMINATOR).find(|n| {
         let product = ratio * f64::from(*n);
-        (product - product.round()).abs() <= 4.0 * f64::EPSILON * product.abs()
+        let whole = (product - product.round()).abs() <= 4.0 * f64::EPSILON * product.abs();
+        whole && product.round().abs() <= f64::from(MAX_DENOMINATOR)
     })
 }
 

@@ -118,6 +118,7 @@ impl World {
         shape: Option<usize>,
         test: Option<Arc<dyn Intersect>>,
     ) -> Result<(), WorldError> {
+        self.core.wake(id);
         let place = self.core.table.place(id).ok_or(WorldError::Stale)?;
         self.core.table.walk.unsettle(place);
         let object: &mut dyn std::any::Any = self.core.table.placed[place].object.as_mut();

@@ -1,8 +1,9 @@
 //! The angles of revolute loop joints with wide limits, which are numbers of the state.
 
 use super::World;
-use crate::constraint::loop_joint::LoopJoint;
+use crate::constraint::loop_joint::{LoopJoint, near};
 use crate::object::FrameState;
+use crate::world::error::WorldError;
 use crate::world::view::ObjectId;
 
 impl World {
@@ -21,6 +22,21 @@ impl World {
         let angle = joint.first_angle(&self.view());
         let Some(range) = self.core.objects().get(id).map(|entry| entry.state_range.x.clone()) else { return };
         self.core.state.x[range].fill(angle);
+    }
+
+    /// Sets the turn of a revolute loop joint that counts its turns (its limits are more than 3π/2 apart, or on one side): its angle is
+    /// that of its frames nearest to `angle`, rad. Without this call it is within π of the middle of the limits when the joint is
+    /// added, or of the angle nearest to 0 that a limit on one side leaves.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`]; [`WorldError::BadState`] if the joint counts no turns, or the angle is not finite.
+    pub fn set_turn(&mut self, id: ObjectId, angle: f64) -> Result<(), WorldError> {
+        self.core.table.get(id).ok_or(WorldError::Stale)?;
+        let joint = self.get::<LoopJoint>(id).filter(|joint| joint.counts_turns() && angle.is_finite());
+        let Some(first) = joint.map(|joint| joint.first_angle(&self.view())) else {
+            return Err(WorldError::BadState(self.name(id).unwrap_or_default().into()));
+        };
+        self.write_state_of(id, &[near(first, angle)])
     }
 
     /// Gives the angle of a joint whose limits were changed a place in the state, or takes it away.

@@ -6,7 +6,7 @@ use tumble_core::collide::Contact;
 use tumble_core::prelude::*;
 use tumble_core::{
     Action, ArchiveError, ArticulationBuilder, EventKind, Firing, Intersect, IntersectPart, Joint, LinkBuilder,
-    Material, ObjectId, ScriptedEvent, StepError, Subject, Trigger,
+    Material, ObjectId, ScriptedEvent, Sleep, StepError, Subject, Trigger,
 };
 
 /// A ball above the ground, and an event for their contact.
@@ -159,6 +159,32 @@ fn a_link_or_one_of_its_shapes_has_a_filter_of_its_own() {
         world.set_link_intersect(id, "lower", shape, None).unwrap();
         assert!(world.archive(&[]).is_ok());
     }
+}
+
+/// It collides with nothing.
+struct Ghost;
+
+impl Intersect for Ghost {
+    fn contacts(&self, _: &IntersectPart, _: &IntersectPart, _: f64, _: &mut Vec<Contact>) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_filter_wakes_the_body_that_gets_it() {
+    let mut world = World::new(Settings::default().with_sleep(Some(Sleep::default()))).unwrap();
+    world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
+    let link = LinkBuilder::new("slide", Joint::prismatic(Vec3::z())).with_mass(1.0);
+    let link =
+        link.with_shape(Shape::sphere(0.1).unwrap(), Pose::identity()).with_pose(Pose::translation(0.0, 0.0, 0.1));
+    let id = world.add(ArticulationBuilder::new("slide").link(link).build().unwrap()).unwrap();
+    while !world.asleep(id) {
+        assert!(world.time() < 10.0);
+        world.step().unwrap();
+    }
+    world.set_link_intersect(id, "slide", None, Some(Arc::new(Ghost))).unwrap();
+    (0..60).for_each(|_| _ = world.step().unwrap());
+    assert!(!world.asleep(id) && world.state_of(id).unwrap()[0] < -0.01);
 }
 
 #[test]

@@ -174,6 +174,8 @@ fn couplings_are_kept_and_their_faults_named() {
     let refused = |joints, multiplier| Mimic::between("m", &world, joints, multiplier, 0.0).unwrap_err().to_string();
     assert!(refused([first, first], 1.0).contains("to itself"));
     assert!(refused([first, second], 0.0).contains("not 0"));
+    assert!(refused([first, second], 1001.0).contains("whole numbers up to 1000"));
+    assert!(Mimic::between("m", &world, [first, second], 1000.0 / 999.0, 0.0).is_ok());
     assert!(refused([first, JointRef::LoopJoint(wheels[0])], 1.0).contains("is no joint"));
     let between =
         LoopJoint::revolute_at("", &world, Some((wheels[2], 0)), Some((wheels[3], 0)), Vec3::x() * 2.5, Vec3::z());

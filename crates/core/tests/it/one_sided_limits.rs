@@ -69,6 +69,21 @@ fn a_limit_far_from_zero_starts_in_its_turn() {
     assert!(why.contains("only a revolute joint"), "{why}");
 }
 
+/// A program says which of the angles that its frames have a joint starts at.
+#[test]
+fn a_joint_starts_in_the_turn_that_is_set() {
+    let mut world = no_gravity(world("time_stepping", 1.0 / 60.0));
+    let (_, joint) = loop_joint(&mut world, [f64::NEG_INFINITY, 1.0], 0.0);
+    world.set_turn(joint, -30.0).unwrap();
+    world.step().unwrap();
+    let [angle, _] = position_of(&world, joint);
+    assert!((angle + 5.0 * TAU).abs() < 1e-9, "{angle}");
+    assert!(matches!(world.set_turn(joint, f64::NAN), Err(WorldError::BadState(_))));
+    let mut other = World::default();
+    let (_, free) = loop_joint(&mut other, [-1.0, 1.0], 0.0);
+    assert!(matches!(other.set_turn(free, 7.0), Err(WorldError::BadState(_))), "it counts no turns");
+}
+
 /// The joint of a link has no turns to count: it stops at the one limit from any distance.
 #[test]
 fn a_joint_of_a_link_has_a_limit_on_one_side() {

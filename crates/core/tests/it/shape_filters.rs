@@ -172,6 +172,23 @@ fn queries_honor_the_filters_of_shapes() {
     assert_eq!(world.point_depth(&Vec3::new(0.5, 0.0, 0.0), &all).unwrap().shape, 0);
 }
 
+/// A sensor between two solid parts is inside the bounds of what is found.
+#[test]
+fn closest_points_and_casts_do_not_find_a_sensor_between_solid_parts() {
+    let mut world = world("time_stepping", 1.0 / 60.0);
+    let at = |z: f64| CompoundPart::new(sphere(0.1), Pose::translation(0.0, 0.0, z));
+    let balls = RigidBody::new(Shape::compound(vec![at(1.0), at(0.0), at(-1.0)]).unwrap()).with_mass(1.0);
+    let id = world.add(balls.with_shape_filter(1, SENSOR)).unwrap();
+    let (all, small, beside) = (QueryFilter::default(), sphere(0.05), Pose::translation(0.5, 0.0, 0.0));
+    // the middle is at the height 0: the nearest solid parts are a meter above and below
+    let found = world.closest_to_shape(&small, &beside, f64::INFINITY, &all).unwrap();
+    assert!((found.distance - (1.25f64.sqrt() - 0.15)).abs() < 1e-12 && found.shapes[1] != 1, "{found:?}");
+    let along = |direction: Vec3| world.cast_shape(&small, &beside, &direction, 9.0, &all);
+    assert_eq!(along(-Vec3::x()), None);
+    let hit = along(Vec3::new(-0.5, 0.0, 1.0)).unwrap();
+    assert_eq!((hit.id, hit.shape), (id, 0));
+}
+
 /// Archives and forks have them; a filter of a shape that is not there is refused.
 #[test]
 fn filters_are_archived_and_checked() {

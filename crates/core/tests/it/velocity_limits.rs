@@ -81,6 +81,29 @@ fn a_drive_beyond_the_velocity_limit_is_braked_and_a_strike_exceeds_it_for_no_st
     });
 }
 
+/// A drive of any strength turns at the limit, of a link and of a loop joint.
+#[test]
+fn a_drive_without_a_largest_force_keeps_the_velocity_limit() {
+    worlds(Vec3::zeros(), |what, _, mut world| {
+        let drive = Drive::Velocity { target: -9.0, limit: f64::INFINITY };
+        let wheel = LinkBuilder::new("wheel", Joint::revolute(Vec3::z())).with_max_velocity(3.0);
+        let wheel = wheel.with_shape(cube(0.2), Pose::identity()).with_mass(2.0).with_drive(drive.clone());
+        let id = world.add(ArticulationBuilder::new("wheel").link(wheel).build().unwrap()).unwrap();
+        let ball = world.add(RigidBody::new(sphere(0.1)).with_mass(1.0).with_pose(Pose::translation(2.0, 0.0, 0.0)));
+        let side = Some((ball.unwrap(), 0));
+        let joint = LoopJoint::revolute_at("axle", &world, side, None, Vec3::x() * 2.0, Vec3::z()).unwrap();
+        let dof = DofSettings { max_velocity: 3.0, drive, ..DofSettings::default() };
+        let joint = world.add(joint.with_dof(dof).unwrap()).unwrap();
+        for _ in 0..20 {
+            world.step().unwrap();
+        }
+        let [_, loop_rate] = world.get::<LoopJoint>(joint).unwrap().position(&world.view()).unwrap();
+        for rate in [world.state_of(id).unwrap()[1], loop_rate] {
+            assert!((rate + 3.0).abs() < 1e-9, "{what}: {rate}");
+        }
+    });
+}
+
 /// A ball that turns about its center, with the joint's axis along z.
 fn pinned(world: &mut World, joint: impl FnOnce(LoopJoint) -> LoopJoint, spin: Vec3) -> (ObjectId, ObjectId) {
     let ball = RigidBody::new(sphere(0.5)).with_mass(4.0).with_angular_velocity(spin);

@@ -79,6 +79,20 @@ pub fn inertia(value: &Bound<'_, PyAny>) -> Result<Mat3> {
     }
 }
 
+/// Converts an inertia of a link: a principal moment may be 0, but none is negative or above the sum of the others.
+pub fn link_inertia(value: &Bound<'_, PyAny>) -> Result<Mat3> {
+    let inertia = inertia(value)?;
+    let mut moments: [f64; 3] = (0.5 * (inertia + inertia.transpose())).symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    let ([least, middle, most], slack) = (moments, 1e-6 * inertia.amax());
+    if inertia.iter().all(|x| x.is_finite()) && (least < -slack || most > least + middle + slack) {
+        return Err(Error::value(format!(
+            "inertia has principal moments {moments:?} kg·m²; expected none below 0 or above the sum of the other two"
+        )));
+    }
+    Ok(inertia)
+}
+
 /// Converts names of axes.
 pub fn locked(names: &[String]) -> Result<LockedAxes> {
     LockedAxes::of_names(names.iter().map(String::as_str)).map_err(|wrong| {

@@ -5,7 +5,7 @@ use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
 use crate::objects::appearance::{self, palette};
 use crate::objects::articulation::Articulation;
-use crate::objects::body::inertia;
+use crate::objects::body::link_inertia;
 use crate::objects::joints::{component, drive_at};
 use crate::objects::shape_material::Given;
 use crate::objects::shapes::Shape;
@@ -349,8 +349,8 @@ fn with_force(
     let common = link.dof().clone();
     for k in 0..count {
         let mut dof = common.clone();
-        if stiffness != 0.0 {
-            let rest = rest.map_or(Ok(0.0), |rest| component("rest", rest, k, count))?;
+        let rest = rest.map_or(Ok(0.0), |rest| component("rest", rest, k, count))?;
+        if stiffness != 0.0 || !rest.is_finite() {
             dof.spring = Some(Spring { stiffness, rest });
         }
         if let Some(drive) = drive {
@@ -395,7 +395,7 @@ fn with_mass(
             return Err(Error::value(format!("link '{name}': expected a mass or a density, not both")));
         }
         (Some(mass), None) if numbers => {
-            let inertia = tensor.map_or(Ok(Mat3::zeros()), inertia)?;
+            let inertia = tensor.map_or(Ok(Mat3::zeros()), link_inertia)?;
             link.with_mass_properties(LinkMass {
                 mass,
                 center: vec3_or(center, "center_of_mass", Vec3::zeros())?,

@@ -3,7 +3,7 @@
 use crate::arrays::convert::{symmetric, vec3, vector, whole_number};
 use crate::errors::Result;
 use crate::objects::articulation::Articulation;
-use crate::objects::body::inertia;
+use crate::objects::body::link_inertia;
 use crate::world::query;
 use numpy::{PyArray1, PyArray2};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -25,6 +25,14 @@ pub struct Link {
 }
 
 impl Link {
+    pub(super) fn articulation(&self) -> &Py<Articulation> {
+        &self.articulation
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
     fn body<'a>(&'a self, py: Python<'a>) -> &'a Articulation {
         self.articulation.bind(py).get()
     }
@@ -97,7 +105,7 @@ impl Link {
 
     #[setter]
     fn set_inertia(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
-        let inertia = inertia(value)?;
+        let inertia = link_inertia(value)?;
         self.change(py, |own| {
             own.inertia = inertia;
             Ok(())

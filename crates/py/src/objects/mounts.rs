@@ -1,10 +1,11 @@
-//! Cameras and lights that bodies carry.
+//! Cameras and lights that bodies and links carry.
 
 use crate::arrays::convert::{some, vec3_or};
 use crate::errors::{Error, Result};
+use crate::objects::link::Link;
 use pyo3::prelude::*;
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{CameraMount, LightMount, Spread};
+use tumble::dynamics::{ArticulatedBody, CameraCarrier, CameraMount, LightCarrier, LightMount, Spread};
 use tumble::scene::facing;
 
 /// Largest and smallest field of view, degrees.
@@ -46,8 +47,17 @@ pub fn light(
         "directional" => Spread::Directional,
         other => return Err(Error::value(format!("kind is '{other}'; expected 'point' or 'directional'"))),
     };
-    if spread == Spread::Directional && places[1].is_none() {
-        return Err(Error::value("direction: a directional light needs one".to_owned()));
+    match (spread, places) {
+        (Spread::Directional, [_, None]) => {
+            return Err(Error::value("direction: a directional light needs one".to_owned()));
+        }
+        (Spread::Directional, [Some(_), _]) => {
+            return Err(Error::value("position: a directional light has none".to_owned()));
+        }
+        (Spread::Point { .. }, [_, Some(_)]) => {
+            return Err(Error::value("direction: a point light has none".to_owned()));
+        }
+        _ => {}
     }
     let ahead = vec3_or(places[1], "direction", Vec3::x())?;
     let up = if ahead.normalize().z.abs() > 0.9 { Vec3::x() } else { Vec3::z() };
@@ -62,4 +72,73 @@ pub fn light(
     }
     let casts_shadow = casts_shadow.unwrap_or(spread == Spread::Directional);
     Ok(LightMount { part: 0, pose, spread, color, intensity, casts_shadow })
+}
+
+#[pymethods]
+impl Link {
+    /// Attaches a camera, at most one, that moves with the link and that scenes keep, as ``RigidBody.attach_camera`` does; in the
+    /// frame of the link.
+    #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
+    #[pyo3(
+        text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"
+    )]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn attach_camera(
+        &self,
+        py: Python<'_>,
+        position: Option<&Bound<'_, PyAny>>,
+        forward: Option<&Bound<'_, PyAny>>,
+        up: Option<&Bound<'_, PyAny>>,
+        fov_deg: f64,
+        near: f64,
+        far: f64,
+    ) -> Result<()> {
+        let camera = camera(position, [forward, up], fov_deg, [near, far])?;
+        let parts = |body: &ArticulatedBody| body.cameras().iter().map(|camera| camera.part).collect();
+        let add = |body: &mut ArticulatedBody, link: &str| {
+            Ok(body.add_camera(link, CameraMount { name: link.to_owned(), ..camera })?)
+        };
+        self.attach(py, "camera", parts, add)
+    }
+
+    /// Attaches a light, at most one, which scenes keep, as ``RigidBody.attach_light`` does; in the frame of the link.
+    #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None))]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn attach_light(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        position: Option<&Bound<'_, PyAny>>,
+        direction: Option<&Bound<'_, PyAny>>,
+        color: Option<&Bound<'_, PyAny>>,
+        intensity: f64,
+        radius: f64,
+        casts_shadow: Option<bool>,
+    ) -> Result<()> {
+        let light = light(kind, [position, direction], color, [intensity, radius], casts_shadow)?;
+        let parts = |body: &ArticulatedBody| body.lights().iter().map(|light| light.part).collect();
+        self.attach(py, "light", parts, |body, link| Ok(body.add_light(link, light)?))
+    }
+}
+
+impl Link {
+    /// Attaches a camera or a light, of which a link and the links fixed to it carry at most one. `parts` are those that carry one.
+    fn attach(
+        &self,
+        py: Python<'_>,
+        what: &str,
+        parts: impl FnOnce(&ArticulatedBody) -> Vec<usize>,
+        add: impl FnOnce(&mut ArticulatedBody, &str) -> Result<()>,
+    ) -> Result<()> {
+        let place = self.articulation().get().in_world()?;
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let part = body.model().frame(self.name()).map(|frame| frame.link.unwrap_or(body.model().links().len()));
+            if part.is_some_and(|part| parts(body).contains(&part)) {
+                let carries = "with the links fixed to it it carries at most one";
+                return Err(Error::value(format!("'{}' has a {what} already; {carries}", self.name())));
+            }
+            add(body, self.name())
+        })
+    }
 }

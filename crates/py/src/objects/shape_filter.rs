@@ -1,12 +1,61 @@
-//! Collision group, mask and sensor of single shapes of a compound body.
+//! Collision group, mask and sensor of single shapes of a compound body and of the links of an articulation.
 
-use crate::errors::Result;
+use crate::errors::{Error, Result};
+use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
 use crate::objects::shape_material::Which;
 use crate::world::query;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tumble::dynamics::ShapeFilter;
+use tumble::collide::Shape;
+use tumble::dynamics::{ArticulatedBody, CollisionGroup, ShapeFilter};
+
+/// What is given of a filter.
+struct Given {
+    group: Option<CollisionGroup>,
+    mask: Option<u64>,
+    sensor: Option<bool>,
+}
+
+impl Given {
+    fn new(group: Option<u8>, mask: Option<&Bound<'_, PyAny>>, sensor: Option<bool>) -> Result<Given> {
+        let mask = mask.map(|mask| query::mask(Some(mask))).transpose()?;
+        Ok(Given { group: group.map(query::group).transpose()?, mask, sensor })
+    }
+
+    /// Returns a filter with what is given; `None` if nothing is.
+    fn over(&self, own: ShapeFilter) -> Option<ShapeFilter> {
+        let given = self.group.is_some() || self.mask.is_some() || self.sensor.is_some();
+        let Given { group, mask, sensor } = self;
+        given.then(|| ShapeFilter {
+            group: group.unwrap_or(own.group),
+            mask: mask.unwrap_or(own.mask),
+            sensor: sensor.unwrap_or(own.sensor),
+        })
+    }
+}
+
+fn as_dict(py: Python<'_>, ShapeFilter { group, mask, sensor }: ShapeFilter) -> Result<Bound<'_, PyDict>> {
+    let filter = PyDict::new(py);
+    filter.set_item("group", group.bit().trailing_zeros())?;
+    filter.set_item("mask", mask)?;
+    filter.set_item("sensor", sensor)?;
+    Ok(filter)
+}
+
+impl RigidBody {
+    /// Returns the index of a part of its compound.
+    fn part_of_compound(&self, shape: Which) -> Result<usize> {
+        let shape = self.numbered(shape)?;
+        let count = self.constant(|body| if let Shape::Compound(c) = body.shape() { c.parts().len() } else { 0 })?;
+        match shape < count {
+            true => Ok(shape),
+            false => {
+                Err(Error::value(format!("shape: there is no part {shape}; the body has a compound of {count} parts")))
+            }
+        }
+    }
+}
 
 #[pymethods]
 impl RigidBody {
@@ -14,13 +63,8 @@ impl RigidBody {
     ///
     /// shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
     fn shape_filter<'py>(&self, py: Python<'py>, shape: Which) -> Result<Bound<'py, PyDict>> {
-        let shape = self.numbered(shape)?;
-        let ShapeFilter { group, mask, sensor } = self.constant(|body| body.shape_filter(shape))?;
-        let filter = PyDict::new(py);
-        filter.set_item("group", group.bit().trailing_zeros())?;
-        filter.set_item("mask", mask)?;
-        filter.set_item("sensor", sensor)?;
-        Ok(filter)
+        let shape = self.part_of_compound(shape)?;
+        as_dict(py, self.constant(|body| body.shape_filter(shape))?)
     }
 
     /// Sets collision group, mask and sensor of one shape, the part of a ``Compound``, by the names of the properties of the body. A sensor has
@@ -37,18 +81,44 @@ impl RigidBody {
         mask: Option<&Bound<'_, PyAny>>,
         sensor: Option<bool>,
     ) -> Result<()> {
-        let shape = self.numbered(shape)?;
-        let given = group.is_some() || mask.is_some() || sensor.is_some();
-        let (group, mask) =
-            (group.map(query::group).transpose()?, mask.map(|mask| query::mask(Some(mask))).transpose()?);
-        self.change(py, |body| {
-            let own = body.shape_filter(shape);
-            let filter = ShapeFilter {
-                group: group.unwrap_or(own.group),
-                mask: mask.unwrap_or(own.mask),
-                sensor: sensor.unwrap_or(own.sensor),
-            };
-            body.set_shape_filter(shape, given.then_some(filter));
+        let (shape, given) = (self.part_of_compound(shape)?, Given::new(group, mask, sensor)?);
+        self.change(py, |body| body.set_shape_filter(shape, given.over(body.shape_filter(shape))))
+    }
+}
+
+#[pymethods]
+impl Articulation {
+    /// Returns what one shape of a link collides with: a dict by the names of ``set_shape_filter``, with the mask as the bits of an
+    /// integer.
+    ///
+    /// shape: name, or number as ``shapes`` of contacts has it.
+    fn shape_filter<'py>(&self, py: Python<'py>, link: &str, shape: Which) -> Result<Bound<'py, PyDict>> {
+        let (part, shape) = self.of_link(link, shape)?;
+        let found = self.of_body(|body| body.shape_filter(part, shape))?;
+        as_dict(py, found.unwrap_or_default())
+    }
+
+    /// Sets collision group, mask and sensor of one shape of a link of a body in a world, by the names of
+    /// ``RigidBody.set_shape_filter``.
+    ///
+    /// shape: name, or number as ``shapes`` of contacts has it. What is not given stays as it is. Without any, a part of a
+    /// ``Compound`` is as the compound again.
+    #[pyo3(signature = (link, shape, *, group=None, mask=None, sensor=None))]
+    fn set_shape_filter(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        shape: Which,
+        group: Option<u8>,
+        mask: Option<&Bound<'_, PyAny>>,
+        sensor: Option<bool>,
+    ) -> Result<()> {
+        let given = Given::new(group, mask, sensor)?;
+        let (place, (part, shape)) = (self.in_world()?, self.of_link(link, shape)?);
+        place.write(py, |inner| {
+            let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let filter = body.shape_filter(part, shape).and_then(|own| given.over(own));
+            Ok(body.set_shape_filter(part, shape, filter)?)
         })
     }
 }

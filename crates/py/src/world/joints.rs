@@ -6,7 +6,7 @@ use crate::errors::{Error, Result};
 use crate::objects::builder::pair;
 use crate::objects::joint::Joint;
 use crate::objects::joint_dof;
-use crate::objects::joints::drive_of;
+use crate::objects::joints::{component, drive_at};
 use crate::objects::place::{Place, by_name};
 use crate::world::add::own_place;
 use crate::world::inner::Inner;
@@ -29,7 +29,7 @@ pub struct Arguments<'a, 'py> {
     pub name: &'a str,
     pub length: Option<f64>,
     pub stiffness: f64,
-    pub rest: Option<f64>,
+    pub rest: Option<&'a Bound<'py, PyAny>>,
     pub damping: f64,
     pub friction: f64,
     pub teeth: Option<[i32; 2]>,
@@ -43,6 +43,7 @@ pub struct Arguments<'a, 'py> {
     pub armature: f64,
     pub twist_limits: Option<&'a Bound<'py, PyAny>>,
     pub dofs: Option<Vec<Bound<'py, PyDict>>>,
+    pub angle: Option<f64>,
 }
 
 /// Adds a joint and returns its handle.
@@ -51,7 +52,13 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
     let (a, b) = (a?, b?);
     let effort = given.effort.unwrap_or(f64::INFINITY);
-    let drive = given.drive.map_or(Ok(Drive::None), |drive| drive_of(drive, effort))?;
+    // of a spherical joint, targets and rest positions may have a number for each degree of freedom
+    let count = if kind == LoopJointKind::Spherical { 3 } else { 1 };
+    let settings = |k: usize| -> Result<(Drive, Option<f64>)> {
+        let drive = given.drive.map_or(Ok(Drive::None), |drive| drive_at(drive, effort, k, count))?;
+        Ok((drive, given.rest.map(|rest| component("rest", rest, k, count)).transpose()?))
+    };
+    let settings = (0..count).map(settings).collect::<Result<Vec<_>>>()?;
     let limits = given.limits.map(pair).transpose()?;
     let twist_limits = given.twist_limits.map(pair).transpose()?;
     let points = [("point", given.points[0], a), ("second_point", given.points[1], b)].map(|(name, point, side)| {
@@ -99,21 +106,20 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         if let Some(length) = given.length {
             joint.set_length(length)?;
         }
-        let rest = given.rest.unwrap_or(if kind.has_length() { joint.length() } else { 0.0 });
+        let at_rest = if kind.has_length() { joint.length() } else { 0.0 };
         let springs = given.stiffness != 0.0 || kind == LoopJointKind::Spring;
-        let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
         let (damping, friction) = (given.damping, given.friction);
         let max_velocity = given.max_velocity.unwrap_or(f64::INFINITY);
-        joint.set_dof(DofSettings {
-            limits,
-            damping,
-            friction,
-            spring,
-            drive,
-            max_velocity,
-            effort,
-            ..DofSettings::default()
-        })?;
+        let dof = |(drive, rest): &(Drive, Option<f64>)| {
+            let rest = rest.unwrap_or(at_rest);
+            let spring = springs.then_some(Spring { stiffness: given.stiffness, rest });
+            let drive = drive.clone();
+            DofSettings { limits, damping, friction, spring, drive, max_velocity, effort, ..DofSettings::default() }
+        };
+        joint.set_dof(dof(&settings[0]))?;
+        for (k, own) in settings.iter().enumerate().skip(1).filter(|(_, own)| **own != settings[0]) {
+            joint.set_dof_at(k, dof(own))?;
+        }
         joint.set_armature(given.armature)?;
         joint.set_cone(given.cone)?;
         joint.set_twist_limits(twist_limits)?;
@@ -122,7 +128,15 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         }
         let [force, torque] = given.breaking.map(|most| most.unwrap_or(f64::INFINITY));
         joint.set_breaking(force, torque)?;
+        if given.angle.is_some_and(|angle| !angle.is_finite() || !kind.counts_turns(limits)) {
+            let expected =
+                "angle: expected a number, of a revolute joint with limits more than 3π/2 apart or on one side";
+            return Err(Error::value(expected));
+        }
         let id = inner.world.add(joint)?;
+        if let Some(angle) = given.angle {
+            inner.world.set_turn(id, angle)?;
+        }
         let name = inner.world.name(id).unwrap_or_default().into();
         Ok(Place { shared: shared.clone(), id, name })
     })?;

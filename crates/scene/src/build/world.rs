@@ -142,6 +142,9 @@ impl SceneFile {
         let wrong = |why: String| BuildError::LoopJoint { scene: self.file.clone(), why };
         let joint = made.and_then(|joint| with_settings(joint, spec)).map_err(|e| wrong(e.to_string()))?;
         let id = world.add(joint).map_err(|e| wrong(e.to_string()))?;
+        if let Some(angle) = spec.angle_rad {
+            world.set_turn(id, angle).map_err(|e| wrong(e.to_string()))?;
+        }
         world.set_enabled(id, spec.enabled).map_err(|e| wrong(e.to_string()))
     }
 

@@ -90,6 +90,7 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
         dofs: vec![LoopDofSpec::default(); kind.dofs()],
         cone_rad: None,
         twist_limits_rad: None,
+        angle_rad: None,
         breaking_force_n: f64::INFINITY,
         breaking_torque_n_m: f64::INFINITY,
         enabled: true,

@@ -64,6 +64,9 @@ pub struct LoopJointSpec {
     pub cone_rad: Option<f64>,
     /// Limits of the twist of a spherical joint, rad.
     pub twist_limits_rad: Option<[f64; 2]>,
+    /// Angle at time 0 of a revolute joint that counts its turns, rad: of its frames, that nearest to this number. Default: within
+    /// half a turn of the middle of its limits.
+    pub angle_rad: Option<f64>,
     /// Force above which it breaks, N. Default infinite.
     pub breaking_force_n: f64,
     /// Torque above which it breaks, N·m. Default infinite.
@@ -189,6 +192,7 @@ impl LoopJointSpec {
                 format!("limits from 0 that allow the length which the joint {keeps}, {length} m"),
             );
         }
+        let angle_rad = read_turn(&mut f, kind, limits);
         let breaking_force_n = f.number_or("breaking_force_n", Bound::POSITIVE, f64::INFINITY);
         let breaking_torque_n_m = f.number_or("breaking_torque_n_m", Bound::POSITIVE, f64::INFINITY);
         let enabled = f.flag_or("enabled", true);
@@ -215,11 +219,26 @@ impl LoopJointSpec {
             dofs,
             cone_rad,
             twist_limits_rad,
+            angle_rad,
             breaking_force_n,
             breaking_torque_n_m,
             enabled,
         })
     }
+}
+
+/// Reads the angle at time 0 of a joint that counts its turns.
+fn read_turn(f: &mut Fields<'_>, kind: LoopJointKind, limits: Option<[f64; 2]>) -> Option<f64> {
+    if kind != LoopJointKind::Revolute {
+        return None;
+    }
+    let angle = number(f, ("angle_rad", Some("angle_deg")))?;
+    let counts = kind.counts_turns(limits);
+    let key = if f.value("angle_rad").is_some() { "angle_rad" } else { "angle_deg" };
+    if let (false, Some(value)) = (counts, f.value(key)) {
+        f.wrong(key, value, "none: a joint counts turns if its limits are more than 3π/2 apart, or on one side");
+    }
+    Some(angle)
 }
 
 /// Returns the length of a joint that has that of its placement, m.

@@ -1,6 +1,7 @@
 //! `[[loop_joint]]` and `[[pair]]`.
 
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
 use tumble_core::collide::Pose;
 use tumble_core::{
@@ -56,11 +57,23 @@ impl Writer<'_> {
             _ if dofs.is_empty() => {}
             _ => t.put("dof", dofs),
         }
+        if let Some(angle) = self.turned(id, joint) {
+            t.put("angle_rad", angle);
+        }
         let [force, torque] = joint.breaking();
         t.put_unless(f64::INFINITY, "breaking_force_n", force);
         t.put_unless(f64::INFINITY, "breaking_torque_n_m", torque);
         t.put_unless(true, "enabled", self.world.status(id).is_none_or(|status| status.enabled));
         self.out += &t.under("[[loop_joint]]");
+    }
+
+    /// Returns the angle of a joint that counts its turns and is more than half a turn from where it starts by itself.
+    fn turned(&self, id: ObjectId, joint: &LoopJoint) -> Option<f64> {
+        let limits = joint.dof().limits.filter(|limits| joint.kind().counts_turns(Some(*limits)));
+        let [lo, hi] = limits?;
+        let middle = if lo.is_finite() && hi.is_finite() { 0.5 * (lo + hi) } else { 0.0_f64.max(lo).min(hi) };
+        let angle = self.world.state_of(id)?.first().copied()?;
+        ((angle - middle).abs() > PI).then_some(angle)
     }
 
     /// Writes a coupling of two joints.

@@ -175,7 +175,7 @@ impl DofSettings {
             ));
         }
         let [lo, hi] = self.limits.unwrap_or([-1.0, 1.0]);
-        if lo.is_nan() || hi.is_nan() || lo > hi {
+        if lo.is_nan() || hi.is_nan() || lo > hi || lo == f64::INFINITY || hi == f64::NEG_INFINITY {
             return Some(("the lower limit", lo, "a number that is not above the upper limit"));
         }
         let spring = self.spring.unwrap_or(Spring { stiffness: 0.0, rest: 0.0 });

@@ -25,11 +25,19 @@ use std::f64::consts::TAU;
 /// Distance of two limits above which the angle is followed, rad.
 pub(crate) const WIDE: f64 = 0.75 * TAU;
 
+impl LoopJointKind {
+    /// Returns whether a joint of this kind with these limits, rad, counts its turns: a revolute one whose limits are more than 3π/2
+    /// apart, or on one side.
+    pub fn counts_turns(self, limits: Option<[f64; 2]>) -> bool {
+        let followed = |[lo, hi]: [f64; 2]| hi - lo > WIDE && (lo.is_finite() || hi.is_finite());
+        self == LoopJointKind::Revolute && limits.is_some_and(followed)
+    }
+}
+
 impl LoopJoint {
     /// Returns whether its angle is a number of the state.
     pub(crate) fn counts_turns(&self) -> bool {
-        let followed = |[lo, hi]: [f64; 2]| hi - lo > WIDE && (lo.is_finite() || hi.is_finite());
-        self.kind == LoopJointKind::Revolute && self.dofs[0].settings.limits.is_some_and(followed)
+        self.kind.counts_turns(self.dofs[0].settings.limits)
     }
 
     /// Sets which object of a world it is.

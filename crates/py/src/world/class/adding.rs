@@ -175,21 +175,23 @@ impl World {
     /// a pulley runs, shape (2, 3), m; ratio: the weight of b's side in its length.
     ///
     /// limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
-    /// ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
+    /// ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m; of a spherical joint, rest
+    /// and target may be a rotation vector, shape (3,).
     /// cone: largest angle of a spherical joint between its axis on a and that on b, rad; twist_limits: (lower, upper) of its turn about that axis, rad. max_velocity: largest speed
     /// of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. effort: the force of its motor, N·m or N, which limits drives
     /// that name no max_force. armature: inertia of its rotor, kg·m² or kg. dofs: dicts of these settings for each degree of freedom in the order of
     /// ``Joint.dofs``, where the joint has several; without them they are those of the first one, of a spherical joint of all three. breaking_force, N, and breaking_torque about the
     /// point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
     /// bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
-    /// are in the world.
+    /// are in the world. angle: rad, of a revolute joint that counts its turns, where its limits are more than 3π/2 apart or on one
+    /// side: of the angles that its frames have now it takes the nearest to this number.
     #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
         second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None,
-        cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None))]
+        cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None, angle=None))]
     #[pyo3(
         text_signature = "($self, kind, a, b=None, point=None, axis=(0.0, 0.0, 1.0), limits=None, drive=None, breaking_force=None, *, name='', \
         second_point=None, second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, \
-        pitch=None, ratio=1.0, ground=None, cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None)"
+        pitch=None, ratio=1.0, ground=None, cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None, angle=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_joint(
@@ -208,7 +210,7 @@ impl World {
         second_axis: Option<&Bound<'_, PyAny>>,
         length: Option<f64>,
         stiffness: f64,
-        rest: Option<f64>,
+        rest: Option<&Bound<'_, PyAny>>,
         damping: f64,
         friction: f64,
         breaking_torque: Option<f64>,
@@ -223,6 +225,7 @@ impl World {
         armature: f64,
         twist_limits: Option<&Bound<'_, PyAny>>,
         dofs: Option<Vec<Bound<'_, PyDict>>>,
+        angle: Option<f64>,
     ) -> Result<Joint> {
         let given = joints::Arguments {
             kind,
@@ -249,6 +252,7 @@ impl World {
             armature,
             twist_limits,
             dofs,
+            angle,
         };
         joints::add(&self.shared, py, &given)
     }
