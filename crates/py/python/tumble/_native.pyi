@@ -489,7 +489,7 @@ class RigidBody:
         """
     @property
     def color(self) -> _Floats:
-        """Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern."""
+        """Color, sRGB, shape (3,), each 0 to 1. Setting it gives the body that of a ``tumble.Appearance`` without anything else."""
     @color.setter
     def color(self, value: ArrayLike) -> None: ...
     @property
@@ -1566,6 +1566,31 @@ class Link:
     def mask(self, value: int | Sequence[int] | None) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def attach_camera(
+        self,
+        position: ArrayLike | None = (0.0, 0.0, 0.0),
+        forward: ArrayLike | None = (1.0, 0.0, 0.0),
+        up: ArrayLike | None = (0.0, 0.0, 1.0),
+        *,
+        fov_deg: float = 40.0,
+        near: float = 0.05,
+        far: float = 500.0,
+    ) -> None:
+        """Attaches a camera, at most one, that moves with the link and that scenes keep, as ``RigidBody.attach_camera`` does; in the
+        frame of the link.
+        """
+    def attach_light(
+        self,
+        kind: Literal["point", "directional"] = "point",
+        *,
+        position: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        color: ArrayLike | None = None,
+        intensity: float = 1.0,
+        radius: float = 0.1,
+        casts_shadow: bool | None = None,
+    ) -> None:
+        """Attaches a light, at most one, which scenes keep, as ``RigidBody.attach_light`` does; in the frame of the link."""
 
 @final
 class Articulation:
@@ -1763,6 +1788,27 @@ class Articulation:
         """Returns the surface constants of one shape of a link: a dict by the names of ``set_shape_material``.
 
         shape: name, or number as ``shapes`` of contacts has it.
+        """
+    def shape_filter(self, link: str, shape: int | str) -> dict[str, Any]:
+        """Returns what one shape of a link collides with: a dict by the names of ``set_shape_filter``, with the mask as the bits of an
+        integer.
+
+        shape: name, or number as ``shapes`` of contacts has it.
+        """
+    def set_shape_filter(
+        self,
+        link: str,
+        shape: int | str,
+        *,
+        group: int | None = None,
+        mask: int | Sequence[int] | None = None,
+        sensor: bool | None = None,
+    ) -> None:
+        """Sets collision group, mask and sensor of one shape of a link of a body in a world, by the names of
+        ``RigidBody.set_shape_filter``.
+
+        shape: name, or number as ``shapes`` of contacts has it. What is not given stays as it is. Without any, a part of a
+        ``Compound`` is as the compound again.
         """
     def set_intersect(self, link: str, test: Intersect | None, shape: int | str | None = None) -> None:
         """Gives the shapes of a link of a body in a world an intersection test of their own, or takes it for None: a function that
@@ -3067,7 +3113,7 @@ class World:
         point: ArrayLike | None = None,
         axis: ArrayLike = (0.0, 0.0, 1.0),
         limits: ArrayLike | None = None,
-        drive: Mapping[str, float] | None = None,
+        drive: Mapping[str, Any] | None = None,
         breaking_force: float | None = None,
         *,
         name: str = "",
@@ -3075,7 +3121,7 @@ class World:
         second_axis: ArrayLike | None = None,
         length: float | None = None,
         stiffness: float = 0.0,
-        rest: float | None = None,
+        rest: ArrayLike | None = None,
         damping: float = 0.0,
         friction: float = 0.0,
         breaking_torque: float | None = None,
@@ -3090,6 +3136,7 @@ class World:
         armature: float = 0.0,
         twist_limits: ArrayLike | None = None,
         dofs: Sequence[Mapping[str, Any]] | None = None,
+        angle: float | None = None,
     ) -> Joint:
         """Joins two bodies, or a body and the world, in their present poses, and returns the joint.
 
@@ -3109,14 +3156,16 @@ class World:
         a pulley runs, shape (2, 3), m; ratio: the weight of b's side in its length.
 
         limits: (lower, upper) of the position, rad or m. drive: a dict with the arguments of
-        ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m.
+        ``Joint.set_drive``. stiffness, rest: a spring along the position, N·m/rad or N/m, and rad or m; of a spherical joint, rest
+        and target may be a rotation vector, shape (3,).
         cone: largest angle of a spherical joint between its axis on a and that on b, rad; twist_limits: (lower, upper) of its turn about that axis, rad. max_velocity: largest speed
         of the position, rad/s or m/s. damping: N·m·s/rad or N·s/m. friction: N·m or N. effort: the force of its motor, N·m or N, which limits drives
         that name no max_force. armature: inertia of its rotor, kg·m² or kg. dofs: dicts of these settings for each degree of freedom in the order of
         ``Joint.dofs``, where the joint has several; without them they are those of the first one, of a spherical joint of all three. breaking_force, N, and breaking_torque about the
         point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
         bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
-        are in the world.
+        are in the world. angle: rad, of a revolute joint that counts its turns, where its limits are more than 3π/2 apart or on one
+        side: of the angles that its frames have now it takes the nearest to this number.
         """
     def add_mimic(self, joint: _Side | Joint, of: _Side | Joint, multiplier: float = 1.0, offset: float = 0.0, *, name: str = "") -> Mimic:
         """Couples two joints, and returns the coupling: the position of ``joint`` is ``multiplier`` times that of ``of``, plus ``offset``.

@@ -404,7 +404,7 @@ impl RigidBody {
         self.change(py, |body| body.material.adhesion = value)
     }
 
-    /// Color, sRGB, shape (3,), each 0 to 1. Setting it removes a pattern.
+    /// Color, sRGB, shape (3,), each 0 to 1. Setting it gives the body that of a ``tumble.Appearance`` without anything else.
     #[getter]
     fn color<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(array(py, &self.constant(appearance::color)?))

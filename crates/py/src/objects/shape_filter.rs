@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use tumble::collide::Shape;
 use tumble::dynamics::{ArticulatedBody, CollisionGroup, ShapeFilter};
 
-/// What is given of a filter.
+/// Parts of a filter that a program gives.
 struct Given {
     group: Option<CollisionGroup>,
     mask: Option<u64>,

@@ -70,10 +70,25 @@ impl Given {
 }
 
 /// A shape that a user names or numbers.
-#[derive(FromPyObject)]
 pub enum Which {
     Number(usize),
     Name(String),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Which {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Which> {
+        if let Ok(name) = value.extract() {
+            return Ok(Which::Name(name));
+        }
+        let wrong = || {
+            let written: String =
+                value.repr().map_or_else(|_| "it".into(), |s| s.to_string()).chars().take(40).collect();
+            PyErr::from(Error::value(format!("shape: expected a name or a number from 0, got {written}")))
+        };
+        value.extract().map(Which::Number).map_err(|_| wrong())
+    }
 }
 
 #[pymethods]

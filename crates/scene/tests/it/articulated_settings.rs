@@ -199,6 +199,25 @@ fn limits_may_be_on_one_side() {
     );
 }
 
+/// The text of a scene has the turn of a joint that counts its turns.
+#[test]
+fn a_joint_begins_in_the_turn_of_its_angle() {
+    let text = |limits: &str| WHEEL.replace("TYPE", "revolute").replace("LIMITS", limits);
+    let world = build(&text("limits_rad = [-inf, 1]\nangle_deg = -1800"));
+    for world in [&world, &again("turned", &world)] {
+        let joint: &LoopJoint = world.get(world.find("axle").unwrap()).unwrap();
+        let [angle, _] = joint.position(&world.view()).unwrap();
+        assert!((angle + 10.0 * PI).abs() < 1e-9, "{angle}");
+    }
+    assert_errors(
+        &text("limits_rad = [-1, 1]\nangle_rad = 7"),
+        &[
+            "s.toml:13:13: `angle_rad` of loop_joint \"axle\" is 7; expected none: a joint counts turns if its limits are more than 3π/2 apart, \
+           or on one side",
+        ],
+    );
+}
+
 const TOOL: &str = r#"
 [[articulated]]
 name = "robot"
