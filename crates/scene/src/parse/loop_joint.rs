@@ -174,6 +174,10 @@ impl LoopJointSpec {
         };
         let spherical = kind == LoopJointKind::Spherical;
         let cone_rad = spherical.then(|| number(&mut f, ("cone_rad", Some("cone_deg")))).flatten();
+        let key = if f.value("cone_rad").is_some() { "cone_rad" } else { "cone_deg" };
+        if let (Some(..0.0), Some(value)) = (cone_rad, f.value(key)) {
+            f.wrong(key, value, "a number that is at least 0");
+        }
         let twist = spherical.then(|| read_limits(&mut f, ("twist_limits_rad", Some("twist_limits_deg"))));
         let twist_limits_rad = twist.flatten().flatten();
         if spherical {

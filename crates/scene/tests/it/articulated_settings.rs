@@ -218,6 +218,15 @@ fn a_joint_begins_in_the_turn_of_its_angle() {
     );
 }
 
+#[test]
+fn a_negative_cone_names_its_line() {
+    let text = WHEEL.replace("TYPE", "spherical").replace("LIMITS", "cone_deg = -1");
+    assert_errors(
+        &text,
+        &["s.toml:12:12: `cone_deg` of loop_joint \"axle\" is -1; expected a number that is at least 0"],
+    );
+}
+
 const TOOL: &str = r#"
 [[articulated]]
 name = "robot"
