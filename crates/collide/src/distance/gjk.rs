@@ -147,7 +147,7 @@ fn weights(edges: &[Vec3], p: &Vec3) -> Option<ArrayVec<f64, 3>> {
     let mut found: ArrayVec<f64, 3> = edges.iter().map(|_| 0.0).collect();
     for _ in 0..REFINEMENTS {
         let rest = edges.iter().zip(&found).fold(*p, |rest, (edge, weight)| rest - edge * *weight);
-        for (weight, more) in found.iter_mut().zip(projected(edges, &rest)) {
+        for (weight, more) in found.iter_mut().zip(weights_of_projection(edges, &rest)) {
             *weight += more;
         }
     }
@@ -156,7 +156,7 @@ fn weights(edges: &[Vec3], p: &Vec3) -> Option<ArrayVec<f64, 3>> {
 }
 
 /// Returns the weights of up to three edges whose sum is the projection of `p` onto their span.
-fn projected(edges: &[Vec3], p: &Vec3) -> [f64; 3] {
+fn weights_of_projection(edges: &[Vec3], p: &Vec3) -> [f64; 3] {
     match *edges {
         [e] => [p.dot(&e) / e.norm_squared(), 0.0, 0.0],
         [e, f] => {

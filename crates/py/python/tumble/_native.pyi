@@ -507,9 +507,9 @@ class RigidBody:
         near: float = 0.05,
         far: float = 500.0,
     ) -> None:
-        """Attaches a camera, at most one, that moves with the body and that scenes keep. position: shape (3,), m; forward, up:
-        directions, shape (3,), not parallel; all in the frame of the shape. fov_deg: vertical field of view, degrees, 1 to 170.
-        near, far: depths between which it sees, m.
+        """Attaches a camera, at most one, that moves with the body or link and that scenes keep. position: shape (3,), m; forward,
+        up: directions, shape (3,), not parallel; all in the frame of the shape of a body, or of the link. fov_deg: vertical
+        field of view, degrees, 1 to 170. near, far: depths between which it sees, m.
         """
     def attach_light(
         self,
@@ -522,10 +522,10 @@ class RigidBody:
         radius: float = 0.1,
         casts_shadow: bool | None = None,
     ) -> None:
-        """Attaches a light, at most one, which scenes keep. kind: ``"point"``, with radius, m, or ``"directional"``, along
-        direction, shape (3,). position: shape (3,), m. Both are in the frame of the shape. color: sRGB, shape (3,). intensity: at least 0; a
-        directional light of 1 makes a white wall that faces it white, a point light at 1 m. casts_shadow: by default of
-        directional lights.
+        """Attaches a light, at most one, which scenes keep. kind: ``"point"``, with position, shape (3,), m, and radius, m, or
+        ``"directional"``, along direction, shape (3,); both in the frame of the shape of a body, or of the link. color: sRGB,
+        shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
+        1 m. casts_shadow: by default of directional lights.
         """
     @property
     def gravity_scale(self) -> float:
@@ -1576,8 +1576,9 @@ class Link:
         near: float = 0.05,
         far: float = 500.0,
     ) -> None:
-        """Attaches a camera, at most one, that moves with the link and that scenes keep, as ``RigidBody.attach_camera`` does; in the
-        frame of the link.
+        """Attaches a camera, at most one, that moves with the body or link and that scenes keep. position: shape (3,), m; forward,
+        up: directions, shape (3,), not parallel; all in the frame of the shape of a body, or of the link. fov_deg: vertical
+        field of view, degrees, 1 to 170. near, far: depths between which it sees, m.
         """
     def attach_light(
         self,
@@ -1590,7 +1591,11 @@ class Link:
         radius: float = 0.1,
         casts_shadow: bool | None = None,
     ) -> None:
-        """Attaches a light, at most one, which scenes keep, as ``RigidBody.attach_light`` does; in the frame of the link."""
+        """Attaches a light, at most one, which scenes keep. kind: ``"point"``, with position, shape (3,), m, and radius, m, or
+        ``"directional"``, along direction, shape (3,); both in the frame of the shape of a body, or of the link. color: sRGB,
+        shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
+        1 m. casts_shadow: by default of directional lights.
+        """
 
 @final
 class Articulation:

@@ -8,7 +8,6 @@ use crate::errors::{Error, Result};
 use crate::objects::appearance;
 use crate::objects::description::alone;
 use crate::objects::handle::handle;
-use crate::objects::mounts;
 use crate::objects::place::Place;
 use crate::world::gc::Anchor;
 use crate::world::{contacts, query};
@@ -16,7 +15,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use tumble::collide::{Mat3, Pose, Vec3};
-use tumble::dynamics::{CameraCarrier, LightCarrier, LockedAxes, Mode, RigidBody as Rigid};
+use tumble::dynamics::{LockedAxes, Mode, RigidBody as Rigid};
 
 /// A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
 /// its file. All vectors are in world axes.
@@ -429,55 +428,6 @@ impl RigidBody {
     fn set_appearance(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
         let look = appearance::given(value)?;
         self.change(py, |body| *body = appearance::described(body.clone(), &look))
-    }
-
-    /// Attaches a camera, at most one, that moves with the body and that scenes keep. position: shape (3,), m; forward, up:
-    /// directions, shape (3,), not parallel; all in the frame of the shape. fov_deg: vertical field of view, degrees, 1 to 170.
-    /// near, far: depths between which it sees, m.
-    #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
-    #[pyo3(
-        text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"
-    )]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn attach_camera(
-        &self,
-        py: Python<'_>,
-        position: Option<&Bound<'_, PyAny>>,
-        forward: Option<&Bound<'_, PyAny>>,
-        up: Option<&Bound<'_, PyAny>>,
-        fov_deg: f64,
-        near: f64,
-        far: f64,
-    ) -> Result<()> {
-        let camera = mounts::camera(position, [forward, up], fov_deg, [near, far])?;
-        if self.constant(|body| !body.cameras().is_empty())? {
-            return Err(Error::value(format!("'{}' has a camera already, and carries at most one", self.place.name)));
-        }
-        self.change(py, |body| *body = body.clone().with_camera(camera))
-    }
-
-    /// Attaches a light, at most one, which scenes keep. kind: ``"point"``, with radius, m, or ``"directional"``, along
-    /// direction, shape (3,). position: shape (3,), m. Both are in the frame of the shape. color: sRGB, shape (3,). intensity: at least 0; a
-    /// directional light of 1 makes a white wall that faces it white, a point light at 1 m. casts_shadow: by default of
-    /// directional lights.
-    #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn attach_light(
-        &self,
-        py: Python<'_>,
-        kind: &str,
-        position: Option<&Bound<'_, PyAny>>,
-        direction: Option<&Bound<'_, PyAny>>,
-        color: Option<&Bound<'_, PyAny>>,
-        intensity: f64,
-        radius: f64,
-        casts_shadow: Option<bool>,
-    ) -> Result<()> {
-        let light = mounts::light(kind, [position, direction], color, [intensity, radius], casts_shadow)?;
-        if self.constant(|body| !body.lights().is_empty())? {
-            return Err(Error::value(format!("'{}' has a light already, and carries at most one", self.place.name)));
-        }
-        self.change(py, |body| *body = body.clone().with_light(light))
     }
 
     /// Factor of the world's gravity, 1 by default.

@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{some, vec3_or};
 use crate::errors::{Error, Result};
+use crate::objects::body::RigidBody;
 use crate::objects::link::Link;
 use pyo3::prelude::*;
 use tumble::collide::{Pose, Vec3};
@@ -74,71 +75,112 @@ pub fn light(
     Ok(LightMount { part: 0, pose, spread, color, intensity, casts_shadow })
 }
 
-#[pymethods]
-impl Link {
-    /// Attaches a camera, at most one, that moves with the link and that scenes keep, as ``RigidBody.attach_camera`` does; in the
-    /// frame of the link.
-    #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
-    #[pyo3(
-        text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"
-    )]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn attach_camera(
-        &self,
-        py: Python<'_>,
-        position: Option<&Bound<'_, PyAny>>,
-        forward: Option<&Bound<'_, PyAny>>,
-        up: Option<&Bound<'_, PyAny>>,
-        fov_deg: f64,
-        near: f64,
-        far: f64,
-    ) -> Result<()> {
-        let camera = camera(position, [forward, up], fov_deg, [near, far])?;
-        let parts = |body: &ArticulatedBody| body.cameras().iter().map(|camera| camera.part).collect();
-        let add = |body: &mut ArticulatedBody, link: &str| {
-            Ok(body.add_camera(link, CameraMount { name: link.to_owned(), ..camera })?)
-        };
-        self.attach(py, "camera", parts, add)
-    }
+/// Gives a class the methods that attach a camera and a light, by its own `attach`.
+macro_rules! attachments {
+    ($class:ident) => {
+        #[pymethods]
+        impl $class {
+            /// Attaches a camera, at most one, that moves with the body or link and that scenes keep. position: shape (3,), m; forward,
+            /// up: directions, shape (3,), not parallel; all in the frame of the shape of a body, or of the link. fov_deg: vertical
+            /// field of view, degrees, 1 to 170. near, far: depths between which it sees, m.
+            #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
+            #[pyo3(
+                text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"
+            )]
+            #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+            fn attach_camera(
+                &self,
+                py: Python<'_>,
+                position: Option<&Bound<'_, PyAny>>,
+                forward: Option<&Bound<'_, PyAny>>,
+                up: Option<&Bound<'_, PyAny>>,
+                fov_deg: f64,
+                near: f64,
+                far: f64,
+            ) -> Result<()> {
+                self.attach(py, Mount::Camera(camera(position, [forward, up], fov_deg, [near, far])?))
+            }
 
-    /// Attaches a light, at most one, which scenes keep, as ``RigidBody.attach_light`` does; in the frame of the link.
-    #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None))]
-    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    fn attach_light(
-        &self,
-        py: Python<'_>,
-        kind: &str,
-        position: Option<&Bound<'_, PyAny>>,
-        direction: Option<&Bound<'_, PyAny>>,
-        color: Option<&Bound<'_, PyAny>>,
-        intensity: f64,
-        radius: f64,
-        casts_shadow: Option<bool>,
-    ) -> Result<()> {
-        let light = light(kind, [position, direction], color, [intensity, radius], casts_shadow)?;
-        let parts = |body: &ArticulatedBody| body.lights().iter().map(|light| light.part).collect();
-        self.attach(py, "light", parts, |body, link| Ok(body.add_light(link, light)?))
+            /// Attaches a light, at most one, which scenes keep. kind: ``"point"``, with position, shape (3,), m, and radius, m, or
+            /// ``"directional"``, along direction, shape (3,); both in the frame of the shape of a body, or of the link. color: sRGB,
+            /// shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
+            /// 1 m. casts_shadow: by default of directional lights.
+            #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None))]
+            #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+            fn attach_light(
+                &self,
+                py: Python<'_>,
+                kind: &str,
+                position: Option<&Bound<'_, PyAny>>,
+                direction: Option<&Bound<'_, PyAny>>,
+                color: Option<&Bound<'_, PyAny>>,
+                intensity: f64,
+                radius: f64,
+                casts_shadow: Option<bool>,
+            ) -> Result<()> {
+                self.attach(py, Mount::Light(light(kind, [position, direction], color, [intensity, radius], casts_shadow)?))
+            }
+        }
+    };
+}
+
+attachments!(RigidBody);
+attachments!(Link);
+
+/// A camera or a light that is attached.
+enum Mount {
+    Camera(CameraMount),
+    Light(LightMount),
+}
+
+impl Mount {
+    fn name(&self) -> &'static str {
+        if let Mount::Camera(_) = self { "camera" } else { "light" }
+    }
+}
+
+impl RigidBody {
+    fn attach(&self, py: Python<'_>, mount: Mount) -> Result<()> {
+        let carries = self.constant(|body| match mount {
+            Mount::Camera(_) => !body.cameras().is_empty(),
+            Mount::Light(_) => !body.lights().is_empty(),
+        })?;
+        if carries {
+            let (name, what) = (&self.place.name, mount.name());
+            return Err(Error::value(format!("'{name}' has a {what} already, and carries at most one")));
+        }
+        self.change(py, |body| {
+            *body = match mount {
+                Mount::Camera(camera) => body.clone().with_camera(camera),
+                Mount::Light(light) => body.clone().with_light(light),
+            }
+        })
     }
 }
 
 impl Link {
-    /// Attaches a camera or a light, of which a link and the links fixed to it carry at most one. `parts` are those that carry one.
-    fn attach(
-        &self,
-        py: Python<'_>,
-        what: &str,
-        parts: impl FnOnce(&ArticulatedBody) -> Vec<usize>,
-        add: impl FnOnce(&mut ArticulatedBody, &str) -> Result<()>,
-    ) -> Result<()> {
+    /// Attaches a camera or a light, of which a link and the links fixed to it carry at most one.
+    fn attach(&self, py: Python<'_>, mount: Mount) -> Result<()> {
         let place = self.articulation().get().in_world()?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
             let part = body.model().frame(self.name()).map(|frame| frame.link.unwrap_or(body.model().links().len()));
-            if part.is_some_and(|part| parts(body).contains(&part)) {
-                let carries = "with the links fixed to it it carries at most one";
-                return Err(Error::value(format!("'{}' has a {what} already; {carries}", self.name())));
+            let carries = |part: usize| match mount {
+                Mount::Camera(_) => body.cameras().iter().any(|camera| camera.part == part),
+                Mount::Light(_) => body.lights().iter().any(|light| light.part == part),
+            };
+            if part.is_some_and(carries) {
+                let (name, what) = (self.name(), mount.name());
+                let most = "with the links fixed to it it carries at most one";
+                return Err(Error::value(format!("'{name}' has a {what} already; {most}")));
             }
-            add(body, self.name())
+            match mount {
+                Mount::Camera(camera) => {
+                    body.add_camera(self.name(), CameraMount { name: self.name().to_owned(), ..camera })?;
+                }
+                Mount::Light(light) => body.add_light(self.name(), light)?,
+            }
+            Ok(())
         })
     }
 }
