@@ -1,6 +1,6 @@
-"""A throw is recorded to a file that Foxglove opens, read back as arrays, and continued from its middle.
+"""A throw is recorded to a file that Foxglove opens, read back as arrays, continued from its middle, and shown as a video.
 
-    python examples/record_and_replay.py [FILE.mcap]
+    python examples/record_and_replay.py [FILE.mcap [VIDEO.mp4]]
 """
 
 import sys
@@ -21,4 +21,6 @@ again = world.fork()
 again.restore(run.states[30])  # the exact state of the middle
 again.step(120)
 same = again.save() == world.save()
+if len(sys.argv) > 2:
+    run.video(sys.argv[2], world)  # a .png, which is animated, needs no ffmpeg
 print(f"{len(run.times)} frames: within {error:.1e} m of the parabola, {energies[0]:.3f} to {energies[-1]:.3f} J, the same end: {same}")
