@@ -1,7 +1,4 @@
-"""A throw is recorded to a file that Foxglove opens, read back as arrays, continued from its middle, and shown as a video.
-
-    python examples/record_and_replay.py [FILE.mcap [VIDEO.mp4]]
-"""
+"""A throw is recorded to a file that Foxglove opens, read back as arrays, continued from its middle, and shown as a video.   python examples/record_and_replay.py [FILE.mcap [VIDEO.mp4]]"""
 
 import sys
 import tumble
@@ -16,7 +13,6 @@ run = tumble.read(path)  # times (n,), and of each body positions (n, 3) and ori
 parabola = 5 * run.times - 9.81 * run.times**2 / 2
 error = abs(run.position("ball")[:, 2] - parabola).max()
 energies = [each.energy().total for each in tumble.replay(path, world.fork())]  # the world itself at each frame
-
 again = world.fork()
 again.restore(run.states[30])  # the exact state of the middle
 again.step(120)

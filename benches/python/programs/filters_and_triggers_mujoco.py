@@ -3,7 +3,7 @@
     target/python/bin/python benches/python/programs/filters_and_triggers_mujoco.py
 
 MuJoCo has no triggers and no events. The gate is a geom whose contacts are found at a depth of 0 and would act at 1 m only, and the program looks through all contacts after each step. The ball lands a step late,
-since contacts are those of the start of a step, and its blow is spread over many steps.
+since contacts are those of the start of a step, and its blow is spread over many steps. Times are within 1.4 ms, ours within 0.5 ms, with steps of 1 ms.
 """
 
 import mujoco

@@ -1,6 +1,6 @@
 """The program ``examples/fork_control.py`` with MuJoCo, as short as its own module ``rollout`` allows.
 
-    target/python/bin/python benches/python/fork_control_mujoco.py
+    target/python/bin/python benches/python/programs/fork_control_mujoco.py
 """
 
 import mujoco

@@ -2,7 +2,7 @@
 
     target/python/bin/python benches/python/programs/quadruped_mujoco.py
 
-With steps of 1/240 s it hops on the spot for ever, so they are 1 ms. At rest its feet carry the weight within LOADS of it; ours within OURS. They sink in by 1 mm.
+With steps of 1/240 s it hops on the spot for ever, so they are 1 ms. At rest its feet carry the weight within 3e-9 of it; ours within 2e-14. They sink into the ground.
 """
 
 import mujoco

@@ -2,7 +2,7 @@
 
     target/python/bin/python benches/python/programs/terrain_mujoco.py
 
-The block slides within SLIDE of the closed form and jumps by 1.5 mm; ours within OURS. Heights are from 0 to 1 of a size, and the friction of a pair is the larger one, unless a geom has priority.
+The block slides within 2e-3 of the closed form and jumps by 1.5 mm; ours within 4e-15, without jumps. Heights are from 0 to 1 of a size, and the friction of a pair is the larger one, unless a geom has priority.
 """
 
 import mujoco
