@@ -4,12 +4,11 @@ import numpy as np
 import tumble
 
 HINGE, LEAN = {"axis": (0, 1, 0), "mass": 1}, np.radians(40)  # each bar is a point of 1 kg at its middle
-builder = tumble.ArticulationBuilder("linkage")
+world, builder = tumble.World(dt=1 / 2400), tumble.ArticulationBuilder("linkage")
 builder.add_link("crank", center_of_mass=(0, 0, -0.25), q=LEAN, **HINGE)
 builder.add_link("coupler", "crank", position=(0, 0, -0.5), center_of_mass=(0.5, 0, 0), q=-LEAN, **HINGE)
 builder.add_link("rocker", "coupler", position=(1, 0, 0), center_of_mass=(0, 0, 0.25), q=LEAN, **HINGE)
 builder.add_link("pin", "rocker", joint="fixed", position=(0, 0, 0.5))
-world = tumble.World(dt=1 / 2400)
 linkage, gaps, angles = world.add_articulation(builder), [], [LEAN]
 world.add_joint("spherical", (linkage, "rocker"), point=(1, 0, 0))
 for _ in range(2400):

@@ -10,12 +10,10 @@ import mujoco
 import numpy as np
 
 HINGE, MASS = '<joint axis="0 1 0"/>', 'mass="1" diaginertia="1e-9 1e-9 1e-9"'  # each bar is a point of 1 kg at its middle
-ROCKER = f'<body name="rocker" pos="1 0 0">{HINGE}<inertial pos="0 0 0.25" {MASS}/><site name="pin" pos="0 0 0.5"/></body>'
-COUPLER = f'<body pos="0 0 -0.5">{HINGE}<inertial pos="0.5 0 0" {MASS}/>{ROCKER}</body>'
-CRANK = f'<body>{HINGE}<inertial pos="0 0 -0.25" {MASS}/>{COUPLER}</body>'
-LOOP = '<connect body1="rocker" anchor="0 0 0.5" solref="0.0009 1" solimp="0.9999 0.9999 0.001"/>'
-BODIES = f"<worldbody>{CRANK}</worldbody><equality>{LOOP}</equality>"
-model = mujoco.MjModel.from_xml_string(f'<mujoco><option timestep="{1 / 2400}"/>{BODIES}</mujoco>')
+model = mujoco.MjModel.from_xml_string(f"""<mujoco><option timestep="{1 / 2400}"/><worldbody>
+<body>{HINGE}<inertial pos="0 0 -0.25" {MASS}/><body pos="0 0 -0.5">{HINGE}<inertial pos="0.5 0 0" {MASS}/>
+<body name="rocker" pos="1 0 0">{HINGE}<inertial pos="0 0 0.25" {MASS}/><site name="pin" pos="0 0 0.5"/></body></body></body>
+</worldbody><equality><connect body1="rocker" anchor="0 0 0.5" solref="0.0009 1" solimp="0.9999 0.9999 0.001"/></equality></mujoco>""")
 data, gaps, angles = mujoco.MjData(model), [], [np.radians(40)]
 data.qpos = np.radians((40, -40, 40))
 for _ in range(2400):
