@@ -36,7 +36,7 @@ impl Object for ArticulatedBody {
         // they may have changed, and a cache may be that of a fork with others
         dynamics.set_inertias(&self.model);
         let (q, v) = x.split_at(self.model.positions());
-        dynamics.refresh(q, v);
+        dynamics.refresh_once(q, v);
         let links = self.model.links().len();
         let (moving, rest) = part_states.split_at_mut(links);
         dynamics.link_accelerations(zeros, accelerations);
@@ -196,7 +196,8 @@ impl Integratable for ArticulatedBody {
     }
 
     fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64) {
-        cache.get::<BodyCache>().free_motion.advance(&self.model, x, h);
+        let BodyCache { dynamics, free_motion, .. } = cache.get();
+        free_motion.advance(&self.model, dynamics, x, h);
     }
 
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {

@@ -166,14 +166,19 @@ impl TimeStepping {
         core.table.walk.x.copy(&core.state.x, &mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
+        // by the caches of the present, which is where the motion begins
+        let Coordinates { objects, caches, threads, .. } = core.coordinates(None);
+        let numbers = Numbers { caches, x: &mut middle.x, ..Numbers::default() };
+        each_object(threads, objects, numbers, |entry, own| free_motion(entry, own.cache, own.x, 0.5 * h));
         let mut motion = core.integration_of(Some(&mut *middle));
-        motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.split_rates(&mut self.work.dp, h);
         core.check_finite(&self.work.dp, Some(&mut *middle))?;
-        for part in core.table.walk.parts.iter().flatten() {
-            let (now, middle) = (&mut core.derived.part_states[part], &middle.derived.part_states[part]);
-            (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
+        for parts in core.table.walk.parts.iter() {
+            let middle = &middle.derived.part_states[parts.clone()];
+            for (now, middle) in core.derived.part_states[parts].iter_mut().zip(middle) {
+                (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
+            }
         }
         Ok(())
     }

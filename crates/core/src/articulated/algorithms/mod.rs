@@ -2,6 +2,7 @@
 //! what its factors give, the mass matrix, inverse dynamics and derivatives.
 
 pub(in crate::articulated) mod abm;
+pub(in crate::articulated) mod coasting;
 pub(in crate::articulated) mod crba;
 pub(in crate::articulated) mod derivatives;
 pub(in crate::articulated) mod dynamics;

@@ -71,10 +71,10 @@ pub(in crate::articulated) struct Compiled {
 }
 
 impl Compiled {
-    /// Takes masses and armatures of the model, which may change between steps.
-    pub fn set_inertias(&mut self, model: &Model) {
+    /// Takes masses and armatures of the model, which may change between steps. Returns whether they did.
+    pub fn set_inertias(&mut self, model: &Model) -> bool {
         if self.inertias.are(&model.inertias) {
-            return;
+            return false;
         }
         self.inertias = model.inertias.clone();
         for (body, link) in self.bodies.iter_mut().zip(model.links()) {
@@ -82,6 +82,7 @@ impl Compiled {
             body.moment = moment(&link.mass, &body.own);
             (body.sphere, body.pair) = biaxial(&link.mass, &body.own);
         }
+        true
     }
 
     pub fn new(model: &Model) -> Compiled {
