@@ -190,6 +190,7 @@ impl Constraint for ArticulatedBody {
     }
 
     fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
+        out.reserve(2 * self.dofs().len());
         self.each_limit(&view.x[me.x.clone()], |limit| out.push(limit.gap));
     }
 

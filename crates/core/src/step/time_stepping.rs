@@ -39,7 +39,7 @@ mod moving;
 mod passing;
 
 use super::adhesion::adhere;
-use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, whiten};
+use super::contacts::{build_rows, detect, displace, impulses, push, shift, whiten};
 use super::impact::{self, Candidate, Part};
 use super::patch::solve_patches;
 use super::warm_start::{row_starts, warm_start};
@@ -200,10 +200,17 @@ impl TimeStepping {
         let moves = work.contact_constraints.iter().any(|t| t.moved.changes());
         let free =
             if work.targets.is_empty() && !moves { FreeTerms::default() } else { FreeTerms::new(middle, core, h) };
-        row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
+        let (threads, contacts, blocks) = (&core.threads, work.contact_constraints.len(), work.rows.blocks.len());
+        first.clone_from(&work.bias);
+        work.rows.add_velocity_on(threads, 0..contacts, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
-        row_velocities(&core.threads, &work.rows, &work.bias, u, &mut work.c);
+        work.c.clone_from(&work.bias);
+        work.rows.add_velocity_on(threads, 0..contacts, u, &mut work.c);
         before.clone_from(&work.c);
+        // rows of constraints hold after the half of free motion that is left
+        let ends: Option<Vec<f64>> =
+            free.change.as_ref().map(|change| u.iter().zip(change).map(|(u, c)| u + c).collect());
+        work.rows.add_velocity_on(threads, contacts..blocks, ends.as_deref().unwrap_or(u), &mut work.c);
         parts.clear();
         parts.resize(work.contact_constraints.len(), Part::default());
         keep.clear();
@@ -246,14 +253,14 @@ impl TimeStepping {
         far.clear();
         let constraints = (work.contact_constraints.len()..).zip(&work.targets);
         for ((b, target), block) in constraints.zip(&work.rows.blocks[work.contact_constraints.len()..]) {
-            let (change, turning) = free.of_row(&work.rows, block, 0);
             if target.inertial {
+                let (change, turning) = free.of_row(&work.rows, block, 0);
                 // from the velocity after impacts to that at the end of the step
                 let forced = work.rows.row_velocity(block, 0, du_force);
                 work.c[block.row as usize] = forced + 2.0 * change - h * turning + h * target.bias_acceleration;
                 continue;
             }
-            work.c[block.row as usize] += change - 0.5 * h * turning;
+            work.c[block.row as usize] -= 0.5 * h * free.turning_of_row(&work.rows, block, 0);
             let open = target.set == RowSet::HalfLine && core.branches.take(Switch::Gap, None, target.error > 0.0);
             let reach = if open { target.error / h } else { 0.0 };
             if reach > 0.0 && work.c[block.row as usize] > -0.5 * reach && target.compliance == 0.0 {

@@ -80,11 +80,13 @@ impl Dynamics {
         }
     }
 
-    /// Does what [`refresh`](Self::refresh) does, unless that was the last thing done, at the same bits.
-    pub(in crate::articulated) fn refresh_once(&mut self, q: &[f64], v: &[f64]) {
-        if !(self.is_at(q) && same(&self.at[q.len()..], v)) {
+    /// Does what [`refresh`](Self::refresh) does, unless that was the last thing done, at the same bits. Returns whether it did.
+    pub(in crate::articulated) fn refresh_once(&mut self, q: &[f64], v: &[f64]) -> bool {
+        let moved = !(self.is_at(q) && same(&self.at[q.len()..], v));
+        if moved {
             self.refresh(q, v);
         }
+        moved
     }
 
     /// Returns whether the last [`refresh`](Self::refresh) was at these positions, with the present inertias.

@@ -20,8 +20,8 @@
 //! geodesic traversed at another speed is the same geodesic, so the scaling does not reduce the
 //! order. Free motion then never gains energy, however long the step.
 
-use crate::articulated::algorithms::coasting::Coasting;
 use crate::articulated::algorithms::dynamics::Dynamics;
+use crate::articulated::algorithms::same_place::LinkRates;
 use crate::articulated::model::Model;
 use crate::articulated::model::coordinates::{integrate, read_vector};
 use crate::articulated::model::joint::Joint;
@@ -32,7 +32,7 @@ use crate::articulated::model::joint::Joint;
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct FreeMotion {
     dynamics: Dynamics,
-    links: Vec<Coasting>,
+    links: Vec<LinkRates>,
     /// A state at a stage.
     stage: Vec<f64>,
     /// Accelerations of the four stages.
@@ -47,7 +47,7 @@ impl FreeMotion {
         let dof = vec![0.0; dynamics.dof()];
         FreeMotion {
             dynamics: dynamics.clone(),
-            links: dynamics.coasting(),
+            links: dynamics.link_rates(),
             stage: vec![0.0; dynamics.positions() + dynamics.dof()],
             a: std::array::from_fn(|_| dof.clone()),
             sum: dof,
@@ -64,10 +64,10 @@ impl FreeMotion {
         let FreeMotion { dynamics, links, stage, a: [first, second, third, fourth], sum } = self;
         let (q, v) = x.split_at_mut(n);
         let energy = if known.is_at(q) {
-            known.coast::<true>(links, v, first)
+            known.free_acceleration_again::<true>(links, v, first)
         } else {
             dynamics.refresh(q, v);
-            dynamics.coast::<true>(links, v, first)
+            dynamics.free_acceleration_again::<true>(links, v, first)
         };
         let (place, speed) = stage.split_at_mut(n);
         displacement(model, (v, first), 0.5 * h, sum);
@@ -75,7 +75,7 @@ impl FreeMotion {
         add(v, first, 0.5 * h, speed);
         dynamics.free_acceleration(place, speed, second);
         add(v, second, 0.5 * h, speed);
-        dynamics.coast::<false>(links, speed, third);
+        dynamics.free_acceleration_again::<false>(links, speed, third);
         displacement(model, (v, third), h, sum);
         reach(model, q, sum, place);
         add(v, third, h, speed);
@@ -126,7 +126,7 @@ impl FreeMotion {
         add(v, d, stretch, &mut self.sum);
         self.dynamics.free_acceleration(q, &self.sum, more);
         add(v, d, -stretch, &mut self.sum);
-        self.dynamics.coast::<false>(&mut self.links, &self.sum, less);
+        self.dynamics.free_acceleration_again::<false>(&mut self.links, &self.sum, less);
         let difference = more.iter().zip(&*less).map(|(more, less)| (more - less) / (4.0 * stretch));
         self.sum.iter_mut().zip(difference).for_each(|(sum, rate)| *sum = rate);
         add_turning(model, (d, v), -0.5, &mut self.sum);

@@ -2,7 +2,6 @@
 //! what its factors give, the mass matrix, inverse dynamics and derivatives.
 
 pub(in crate::articulated) mod abm;
-pub(in crate::articulated) mod coasting;
 pub(in crate::articulated) mod crba;
 pub(in crate::articulated) mod derivatives;
 pub(in crate::articulated) mod dynamics;
@@ -12,4 +11,5 @@ pub(in crate::articulated) mod free_motion;
 pub(in crate::articulated) mod jacobian;
 pub(in crate::articulated) mod kinematics;
 pub(in crate::articulated) mod rnea;
+pub(in crate::articulated) mod same_place;
 pub(in crate::articulated) mod whiten;

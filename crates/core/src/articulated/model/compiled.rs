@@ -31,6 +31,17 @@ pub(in crate::articulated) enum JointKind {
     Floating(usize),
 }
 
+impl JointKind {
+    /// Returns the number of degrees of freedom.
+    pub fn dof(self) -> usize {
+        match self {
+            JointKind::Revolute | JointKind::Prismatic => 1,
+            JointKind::Spherical(_) => 3,
+            JointKind::Floating(_) => 6,
+        }
+    }
+}
+
 /// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the
 /// mass.
 #[derive(Clone, Debug)]

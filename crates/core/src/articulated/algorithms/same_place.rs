@@ -9,9 +9,9 @@ use crate::articulated::algorithms::dynamics::{Dynamics, load_vector};
 use crate::articulated::model::compiled::JointKind;
 use crate::spatial::{Force, Motion, Vector};
 
-/// What a link has of a velocity, in the sweeps: see [`Slot`](crate::articulated::algorithms::abm::Slot).
+/// Quantities of a link that depend on its velocity, in the sweeps: see [`Slot`](crate::articulated::algorithms::abm::Slot).
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::articulated) struct Coasting {
+pub(in crate::articulated) struct LinkRates {
     angular: Vector,
     linear: Vector,
     bias_acceleration: Motion,
@@ -21,23 +21,23 @@ pub(in crate::articulated) struct Coasting {
 }
 
 impl Dynamics {
-    /// Returns the buffers of [`coast`](Self::coast).
-    pub(in crate::articulated) fn coasting(&self) -> Vec<Coasting> {
-        vec![Coasting::default(); self.sweep.slots.len()]
+    /// Returns the buffers of [`free_acceleration_again`](Self::free_acceleration_again).
+    pub(in crate::articulated) fn link_rates(&self) -> Vec<LinkRates> {
+        vec![LinkRates::default(); self.sweep.slots.len()]
     }
 
     /// Writes `q̈` without any force to `qdd`, for velocities `v` at the positions of the last
     /// [`refresh`](Self::refresh) or [`free_acceleration`](Self::free_acceleration). Returns the
     /// kinetic energy, J, if it is asked for by `ENERGY`.
-    pub(in crate::articulated) fn coast<const ENERGY: bool>(
+    pub(in crate::articulated) fn free_acceleration_again<const ENERGY: bool>(
         &self,
-        links: &mut [Coasting],
+        links: &mut [LinkRates],
         v: &[f64],
         qdd: &mut [f64],
     ) -> f64 {
         let (compiled, Sweep { slots, blocks }) = (&self.compiled, &self.sweep);
         let mut doubled = 0.0;
-        links[0] = Coasting::default();
+        links[0] = LinkRates::default();
         for (i, body) in compiled.bodies.iter().enumerate() {
             let (slot, parent) = (&slots[i + 1], &links[body.parent]);
             let (outer, carried) = (parent.angular, parent.bias_acceleration);
@@ -58,7 +58,7 @@ impl Dynamics {
             let (rotational, pair) = inertia_about_origin(body, &slot.rotation);
             let h = slot.rotation.of_constant(&body.moment);
             let bias = bias_of(&rotational, pair, (h, body.mass), angular, &bias_acceleration);
-            links[i + 1] = Coasting { angular, linear, bias_acceleration, bias, ..Coasting::default() };
+            links[i + 1] = LinkRates { angular, linear, bias_acceleration, bias, ..LinkRates::default() };
             if !ENERGY {
                 continue;
             }
