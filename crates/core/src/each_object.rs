@@ -72,6 +72,9 @@ pub(crate) fn first_object<'a>(
     is: impl Fn(&Entry) -> bool + Sync,
 ) -> Option<Entry<'a>> {
     let walked = &objects.table.walk.places;
+    if threads.count() == 1 || walked.len() < 2 * OBJECTS {
+        return walked.iter().map(|&place| objects.at(place as usize)).find(|entry| is(entry));
+    }
     let mut found: Vec<(Range<usize>, Option<usize>)> =
         threads.pieces(walked.len(), OBJECTS).into_iter().map(|places| (places, None)).collect();
     threads.each(&mut found[..], |(places, found)| {

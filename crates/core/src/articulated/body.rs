@@ -140,6 +140,8 @@ pub(super) struct BodyCache {
     pub free_motion: FreeMotion,
     /// Zero joint forces or accelerations.
     pub zeros: Vec<f64>,
+    /// Accelerations without any force at that state; empty until they are asked for.
+    pub free_rate: Vec<f64>,
     pub wrenches: Vec<Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
 }
@@ -151,6 +153,7 @@ impl BodyCache {
             scratch: dynamics.scratch(),
             free_motion: FreeMotion::new(&dynamics),
             zeros: vec![0.0; model.dof()],
+            free_rate: Vec::with_capacity(model.dof()),
             wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
             dynamics,

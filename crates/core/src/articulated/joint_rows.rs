@@ -24,24 +24,24 @@ impl ArticulatedBody {
         !self.couplings.is_empty() || self.dofs().iter().any(rows) || self.dofs().iter().enumerate().any(sprung)
     }
 
-    /// Returns the degrees of freedom with the indices of their velocities and the positions that springs see; positions are 0 if
-    /// there are none.
-    fn dof_states<'a>(&'a self, x: &'a [f64], time: f64) -> impl Iterator<Item = (usize, DofState<'a>, f64)> {
+    /// Calls `act` with each degree of freedom: the index of its velocity, its state and the position that springs see. Positions are 0
+    /// if there are none.
+    fn each_dof<'a>(&'a self, x: &'a [f64], time: f64, mut act: impl FnMut(usize, DofState<'a>, f64)) {
         let n = self.model.positions();
-        self.model.links().iter().flat_map(move |link| {
-            let (dof, own) = (link.joint.dof(), &self.dofs()[link.v..link.v + link.joint.dof()]);
+        for link in self.model.links() {
+            let dof = link.joint.dof();
+            let own = &self.dofs()[link.v..link.v + dof];
             let [driven, sprung] = match dof {
                 1 => [[x[link.q]; 3]; 2],
                 3 => ball_positions(&x[link.q..], own, time),
                 _ => [[0.0; 3]; 2],
             };
-            (0..dof).map(move |k| {
-                let (index, settings) = (link.v + k, &own[k]);
+            for (k, settings) in own.iter().enumerate() {
                 let limits = settings.limits.filter(|_| dof == 1);
                 let (q, rest) = if dof <= 3 { (driven[k], sprung[k]) } else { (0.0, 0.0) };
-                (index, DofState { q, v: x[n + index], settings, limits }, rest)
-            })
-        })
+                act(link.v + k, DofState { q, v: x[n + link.v + k], settings, limits }, rest);
+            }
+        }
     }
 
     /// Returns whether the spring of a degree of freedom is a row wherever soft forces are rows.
@@ -52,26 +52,28 @@ impl ArticulatedBody {
     /// Calls `row` with the targets of the rows of a degree of freedom that carry forces: spring, dry friction, damping, drive.
     fn forces_of(
         &self,
-        (index, dof, sprung): &(usize, DofState, f64),
-        level: Level,
-        time: f64,
+        (index, dof, sprung): (usize, &DofState, f64),
+        (level, time): (Level, f64),
         mut row: impl FnMut(RowTarget),
     ) {
-        if dof.settings.spring.is_some() && self.has_soft_spring(*index) {
-            dof.spring(level, *sprung).into_iter().for_each(&mut row);
+        if dof.settings.spring.is_some() && self.has_soft_spring(index) {
+            dof.spring(level, sprung).into_iter().for_each(&mut row);
         }
         dof.forces(level, time, row);
     }
 
     /// Adds the forces of springs and, where rows are not implicit, of damping and position drives.
     pub(super) fn joint_forces(&self, x: &[f64], implicit: bool, time: f64, out: &mut [f64]) {
-        for (index, dof, sprung) in self.dof_states(x, time) {
+        if implicit && self.dofs().iter().all(|settings| settings.spring.is_none()) {
+            return;
+        }
+        self.each_dof(x, time, |index, dof, sprung| {
             let DofState { q, v, settings, .. } = dof;
             if settings.spring.is_some() && !(implicit && self.has_soft_spring(index)) {
                 out[index] += settings.spring_force(sprung);
             }
             out[index] += if implicit { 0.0 } else { settings.explicit_force(q, v) };
-        }
+        });
     }
 
     /// Adds the impulses of drives to `out`, one number per degree of freedom, for the forces `rows` of its rows over a
@@ -79,20 +81,24 @@ impl ArticulatedBody {
     ///
     /// A drive and a damping that share a row divide its force by the velocity at the end: `f_drive = f + d·v`.
     pub(crate) fn add_drives(&self, x: &[f64], time: f64, rows: &[RowStart], h: f64, out: &mut [f64]) {
-        let limits = self.limits(x).count() + self.velocity_limits(x).count();
+        let mut limits = 0;
+        self.each_limit(x, |_| limits += 1);
+        self.each_velocity_limit(x, |_, _, _| limits += 1);
         let targets = |level: Level| -> Vec<usize> {
-            let count = |dof: (usize, DofState, f64)| {
+            let mut counts = Vec::with_capacity(self.dofs().len());
+            self.each_dof(x, time, |index, dof, sprung| {
                 let mut count = 0;
-                self.forces_of(&dof, level, time, |_| count += 1);
-                count
-            };
-            self.dof_states(x, time).map(count).collect()
+                self.forces_of((index, &dof, sprung), (level, time), |_| count += 1);
+                counts.push(count);
+            });
+            counts
         };
         let levels = [Level::Velocity { h }, Level::Acceleration { h, soft: None }];
         let of = |level: &Level| limits + targets(*level).iter().sum::<usize>() + self.couplings.len() == rows.len();
         let Some(level) = levels.into_iter().find(of) else { return };
-        let mut end = limits;
-        for ((index, dof, sprung), count) in self.dof_states(x, time).zip(targets(level)) {
+        let (mut end, mut counts) = (limits, targets(level).into_iter());
+        self.each_dof(x, time, |index, dof, sprung| {
+            let count = counts.next().unwrap_or(0);
             end += count;
             let damping = dof.settings.damping * dof.v;
             let spring = dof.settings.spring.is_some() && self.has_soft_spring(index);
@@ -106,43 +112,54 @@ impl ArticulatedBody {
                 (None, None) => dof.settings.explicit_force(dof.q, dof.v) + damping,
                 _ => 0.0,
             };
-        }
+        });
     }
 
     /// Returns the energy of the springs, J.
     pub(super) fn spring_energy(&self, x: &[f64]) -> f64 {
-        let energy = |(_, dof, q): (usize, DofState, f64)| {
-            dof.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (q - s.rest).powi(2))
-        };
-        self.dof_states(x, 0.0).map(energy).sum()
+        let mut energy = 0.0;
+        self.each_dof(x, 0.0, |_, dof, q| {
+            energy += dof.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (q - s.rest).powi(2));
+        });
+        energy
     }
 
-    /// Returns the limits in the order of their rows: for each degree of freedom the lower, then the upper; of a spherical joint
-    /// the cone and the limits of the twist about its axis.
-    fn limits<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Limit> {
+    /// Calls `act` with the limits in the order of their rows: for each degree of freedom the lower, then the upper; of a spherical
+    /// joint the cone and the limits of the twist about its axis.
+    fn each_limit(&self, x: &[f64], mut act: impl FnMut(Limit)) {
         let n = self.model.positions();
-        self.model.links().iter().filter(|link| matches!(link.joint.dof(), 1 | 3)).flat_map(move |link| {
-            let single = link.joint.dof() == 1;
-            (0..link.joint.dof()).flat_map(move |k| {
-                let (index, settings) = (link.v + k, &self.dofs()[link.v + k]);
-                let limits = settings.limits.filter(|_| single);
-                let state = DofState { q: x[link.q], v: x[n + index], settings, limits };
-                let sides = state.limits().map(move |(sign, gap)| Limit { gap, along: Along::Dof { index, sign } });
-                let (q, v) = (&x[link.q..], &x[n + link.v..]);
-                let cone = settings.limits.filter(|[_, cone]| !single && cone.is_finite());
-                let cone = cone.map(|[_, cone]| Limit::of_cone(cone, link.v, Swing::of(k, q, v)));
-                let twist = settings.twist_limits.filter(|_| !single);
-                let twist =
-                    twist.into_iter().flat_map(move |limits| Limit::of_twist(limits, link.v, &Swing::twist(k, q, v)));
-                sides.chain(cone).chain(twist)
-            })
-        })
+        for link in self.model.links() {
+            let (dof, q) = (link.joint.dof(), &x[link.q..]);
+            for (k, settings) in self.dofs()[link.v..link.v + dof].iter().enumerate() {
+                match dof {
+                    1 => {
+                        let state = DofState { q: q[0], v: x[n + link.v], settings, limits: settings.limits };
+                        state.limits().for_each(|(sign, gap)| {
+                            act(Limit { gap, along: Along::Dof { index: link.v, sign } });
+                        });
+                    }
+                    3 => {
+                        let v = &x[n + link.v..];
+                        if let Some([_, cone]) = settings.limits.filter(|[_, cone]| cone.is_finite()) {
+                            act(Limit::of_cone(cone, link.v, Swing::of(k, q, v)));
+                        }
+                        if let Some(limits) = settings.twist_limits {
+                            Limit::of_twist(limits, link.v, &Swing::twist(k, q, v)).into_iter().for_each(&mut act);
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
     }
 
-    /// Returns the rows of the velocity limits: index of the degree of freedom, sign and target.
-    fn velocity_limits<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = (usize, f64, RowTarget)> {
-        self.dof_states(x, 0.0)
-            .flat_map(|(index, p, _)| p.velocity_limits().map(move |(sign, target)| (index, sign, target)))
+    /// Calls `act` with the rows of the velocity limits: index of the degree of freedom, sign and target.
+    fn each_velocity_limit(&self, x: &[f64], mut act: impl FnMut(usize, f64, RowTarget)) {
+        if self.dofs().iter().any(|settings| settings.max_velocity.is_finite()) {
+            self.each_dof(x, 0.0, |index, dof, _| {
+                dof.velocity_limits().for_each(|(sign, target)| act(index, sign, target));
+            });
+        }
     }
 }
 
@@ -151,7 +168,7 @@ impl Constraint for ArticulatedBody {
         let x = &view.x[me.x.clone()];
         let dof = self.model.dof();
         let mut maker = RowMaker { unit: vec![0.0; dof], known: vec![None; dof], out };
-        for Limit { gap, along } in self.limits(x) {
+        self.each_limit(x, |Limit { gap, along }| {
             let target = RowTarget::new(RowSet::HalfLine, gap);
             match along {
                 Along::Dof { index, sign } => maker.row_of(target, index, sign),
@@ -160,13 +177,11 @@ impl Constraint for ArticulatedBody {
                     maker.row(RowTarget { bias_acceleration, ..target }, &entries);
                 }
             }
-        }
-        for (index, sign, target) in self.velocity_limits(x) {
-            maker.row_of(target, index, sign);
-        }
-        for dof in self.dof_states(x, view.time) {
-            self.forces_of(&dof, level, view.time, |target| maker.row_of(target, dof.0, 1.0));
-        }
+        });
+        self.each_velocity_limit(x, |index, sign, target| maker.row_of(target, index, sign));
+        self.each_dof(x, view.time, |index, dof, sprung| {
+            self.forces_of((index, &dof, sprung), (level, view.time), |target| maker.row_of(target, index, 1.0));
+        });
         for c in &self.couplings {
             let position = |dof| self.position_of(dof).map_or(0.0, |q| x[q]);
             let error = position(c.dof) - c.multiplier * position(c.of) - c.offset;
@@ -175,7 +190,8 @@ impl Constraint for ArticulatedBody {
     }
 
     fn gaps(&self, me: &StateRange, view: &WorldView, out: &mut Vec<f64>) {
-        out.extend(self.limits(&view.x[me.x.clone()]).map(|limit| limit.gap));
+        out.reserve(2 * self.dofs().len());
+        self.each_limit(&view.x[me.x.clone()], |limit| out.push(limit.gap));
     }
 
     fn on_itself(&self) -> bool {

@@ -32,11 +32,13 @@ impl Object for ArticulatedBody {
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
-        let BodyCache { dynamics, zeros, accelerations, .. } = cache.get();
+        let BodyCache { dynamics, zeros, accelerations, free_rate, .. } = cache.get();
         // they may have changed, and a cache may be that of a fork with others
         dynamics.set_inertias(&self.model);
         let (q, v) = x.split_at(self.model.positions());
-        dynamics.refresh(q, v);
+        if dynamics.refresh_once(q, v) {
+            free_rate.clear();
+        }
         let links = self.model.links().len();
         let (moving, rest) = part_states.split_at_mut(links);
         dynamics.link_accelerations(zeros, accelerations);
@@ -191,12 +193,17 @@ impl Integratable for ArticulatedBody {
     }
 
     fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {
-        let BodyCache { dynamics, scratch, zeros, .. } = cache.get();
-        dynamics.accelerate(scratch, zeros, &[], out);
+        let BodyCache { dynamics, scratch, zeros, free_rate, .. } = cache.get();
+        if free_rate.is_empty() {
+            free_rate.resize(out.len(), 0.0);
+            dynamics.accelerate(scratch, zeros, &[], free_rate);
+        }
+        out.copy_from_slice(free_rate);
     }
 
     fn free_motion(&self, cache: &mut Cache, x: &mut [f64], h: f64) {
-        cache.get::<BodyCache>().free_motion.advance(&self.model, x, h);
+        let BodyCache { dynamics, free_motion, .. } = cache.get();
+        free_motion.advance(&self.model, dynamics, x, h);
     }
 
     fn integrate_positions(&self, x: &mut [f64], v: &[f64], h: f64) {

@@ -15,6 +15,7 @@
 
 use super::gram::{Response, add_gram};
 use crate::threads::Threads;
+use std::ops::Range;
 
 /// Minimum number of blocks of a piece on one thread.
 const BLOCKS: usize = 256;
@@ -84,7 +85,7 @@ impl Block {
     }
 
     /// Returns the indices of the block's rows in `c` and `λ`.
-    pub fn range(&self) -> std::ops::Range<usize> {
+    pub fn range(&self) -> Range<usize> {
         self.row as usize..self.row as usize + self.set.rows()
     }
 }
@@ -163,14 +164,19 @@ impl Rows {
         }
     }
 
-    /// Adds `(Yᵀu)_i` to `c_i` for every row, on several threads.
-    pub(crate) fn add_velocity_on(&self, threads: &Threads, u: &[f64], c: &mut [f64]) {
-        if threads.count() == 1 || self.blocks.len() < 2 * BLOCKS {
-            return self.add_velocity(u, c);
+    /// Adds `(Yᵀu)_i` to `c_i` for every row of a range of blocks, on several threads.
+    pub(crate) fn add_velocity_on(&self, threads: &Threads, range: Range<usize>, u: &[f64], c: &mut [f64]) {
+        if threads.count() == 1 || range.len() < 2 * BLOCKS {
+            for block in &self.blocks[range] {
+                for (k, row) in block.range().enumerate() {
+                    c[row] += self.row_velocity(block, k, u);
+                }
+            }
+            return;
         }
-        let mut rest = c;
-        let pieces = threads.pieces(self.blocks.len(), BLOCKS).into_iter().map(|piece| {
-            let blocks = &self.blocks[piece];
+        let mut rest = &mut c[self.blocks[range.start].row as usize..];
+        let pieces = threads.pieces(range.len(), BLOCKS).into_iter().map(|piece| {
+            let blocks = &self.blocks[range.clone()][piece];
             let rows: usize = blocks.iter().map(|block| block.set.rows()).sum();
             let (c, after) = std::mem::take(&mut rest).split_at_mut(rows);
             rest = after;

@@ -317,7 +317,9 @@ fn present_errors(Coordinates { objects, x, caches, .. }: Coordinates, work: &mu
             );
         }
     }
-    for (block, target) in work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets) {
+    let rows = work.rows.blocks[work.contact_constraints.len()..].iter().zip(&mut work.targets);
+    // springs have no error to correct
+    for (block, target) in rows.filter(|(_, target)| target.compliance == 0.0 || target.set == RowSet::HalfLine) {
         let velocity = work.bias[block.row as usize] + work.rows.row_velocity(block, 0, &u);
         target.error += ahead * (0.5 * ahead * target.bias_acceleration - (velocity - target.velocity));
     }
@@ -457,7 +459,7 @@ fn each_displaced(
 pub(crate) fn row_velocities(threads: &Threads, rows: &Rows, bias: &[f64], u: &[f64], c: &mut Vec<f64>) {
     c.clear();
     c.extend_from_slice(bias);
-    rows.add_velocity_on(threads, u, c);
+    rows.add_velocity_on(threads, 0..rows.blocks.len(), u, c);
 }
 
 /// Islands of more blocks share the relaxations of the settings; smaller ones have as many each.

@@ -39,7 +39,7 @@ mod moving;
 mod passing;
 
 use super::adhesion::adhere;
-use super::contacts::{build_rows, detect, displace, impulses, push, row_velocities, shift, whiten};
+use super::contacts::{build_rows, detect, displace, impulses, push, shift, whiten};
 use super::impact::{self, Candidate, Part};
 use super::patch::solve_patches;
 use super::warm_start::{row_starts, warm_start};
@@ -166,14 +166,19 @@ impl TimeStepping {
         core.table.walk.x.copy(&core.state.x, &mut self.x0);
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
+        // by the caches of the present, which is where the motion begins
+        let Coordinates { objects, caches, threads, .. } = core.coordinates(None);
+        let numbers = Numbers { caches, x: &mut middle.x, ..Numbers::default() };
+        each_object(threads, objects, numbers, |entry, own| free_motion(entry, own.cache, own.x, 0.5 * h));
         let mut motion = core.integration_of(Some(&mut *middle));
-        motion.free_motion(0.5 * h);
         motion.evaluate(time + 0.5 * h, &mut self.work.dp);
         motion.split_rates(&mut self.work.dp, h);
         core.check_finite(&self.work.dp, Some(&mut *middle))?;
-        for part in core.table.walk.parts.iter().flatten() {
-            let (now, middle) = (&mut core.derived.part_states[part], &middle.derived.part_states[part]);
-            (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
+        for parts in core.table.walk.parts.iter() {
+            let middle = &middle.derived.part_states[parts.clone()];
+            for (now, middle) in core.derived.part_states[parts].iter_mut().zip(middle) {
+                (now.acceleration, now.angular_acceleration) = (middle.acceleration, middle.angular_acceleration);
+            }
         }
         Ok(())
     }
@@ -195,10 +200,17 @@ impl TimeStepping {
         let moves = work.contact_constraints.iter().any(|t| t.moved.changes());
         let free =
             if work.targets.is_empty() && !moves { FreeTerms::default() } else { FreeTerms::new(middle, core, h) };
-        row_velocities(&core.threads, &work.rows, &work.bias, u0, first);
+        let (threads, contacts, blocks) = (&core.threads, work.contact_constraints.len(), work.rows.blocks.len());
+        first.clone_from(&work.bias);
+        work.rows.add_velocity_on(threads, 0..contacts, u0, first);
         u.iter_mut().zip(du_force).for_each(|(u, du)| *u += du);
-        row_velocities(&core.threads, &work.rows, &work.bias, u, &mut work.c);
+        work.c.clone_from(&work.bias);
+        work.rows.add_velocity_on(threads, 0..contacts, u, &mut work.c);
         before.clone_from(&work.c);
+        // rows of constraints hold after the half of free motion that is left
+        let ends: Option<Vec<f64>> =
+            free.change.as_ref().map(|change| u.iter().zip(change).map(|(u, c)| u + c).collect());
+        work.rows.add_velocity_on(threads, contacts..blocks, ends.as_deref().unwrap_or(u), &mut work.c);
         parts.clear();
         parts.resize(work.contact_constraints.len(), Part::default());
         keep.clear();
@@ -241,14 +253,14 @@ impl TimeStepping {
         far.clear();
         let constraints = (work.contact_constraints.len()..).zip(&work.targets);
         for ((b, target), block) in constraints.zip(&work.rows.blocks[work.contact_constraints.len()..]) {
-            let (change, turning) = free.of_row(&work.rows, block, 0);
             if target.inertial {
+                let (change, turning) = free.of_row(&work.rows, block, 0);
                 // from the velocity after impacts to that at the end of the step
                 let forced = work.rows.row_velocity(block, 0, du_force);
                 work.c[block.row as usize] = forced + 2.0 * change - h * turning + h * target.bias_acceleration;
                 continue;
             }
-            work.c[block.row as usize] += change - 0.5 * h * turning;
+            work.c[block.row as usize] -= 0.5 * h * free.turning_of_row(&work.rows, block, 0);
             let open = target.set == RowSet::HalfLine && core.branches.take(Switch::Gap, None, target.error > 0.0);
             let reach = if open { target.error / h } else { 0.0 };
             if reach > 0.0 && work.c[block.row as usize] > -0.5 * reach && target.compliance == 0.0 {

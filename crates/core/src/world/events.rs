@@ -11,7 +11,7 @@
 use super::{ContactPoint, Core, World, WorldState};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::own_tests::OwnTests;
-use crate::object::{FilterClass, FilteredPart};
+use crate::object::{FilterClass, FilteredPart, has_sensor};
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -397,6 +397,10 @@ impl Core {
 
     /// Returns the pairs of a sensor and a part that overlaps it, sorted.
     fn sensed_pairs(&self) -> Vec<Touching> {
+        let sensing = |e: Entry| e.status.enabled && e.object.collidable().is_some_and(has_sensor);
+        if !self.objects().iter().any(sensing) {
+            return Vec::new();
+        }
         let parts = |sensors: bool| {
             let walked = sensors.then(|| self.objects().iter()).into_iter().flatten(); // no sensor is settled
             let all = (!sensors).then(|| self.objects().all()).into_iter().flatten();

@@ -3,9 +3,9 @@
 
 use crate::articulated_random::*;
 use nalgebra::DMatrix;
-use tumble_core::Model;
 use tumble_core::articulated::*;
 use tumble_core::collide::Vec3;
+use tumble_core::{Joint, Model};
 
 const G: Vec3 = Vec3::new(0.3, -0.7, -9.81);
 /// Step of the differences: errors of its square and of rounding are below 1e-8 of the largest entry.
@@ -47,42 +47,76 @@ fn trees() -> Vec<Model> {
     trees
 }
 
+/// The trees with a rotor at every joint but the floating root.
+fn trees_with_rotors() -> Vec<Model> {
+    let with_rotors = |model: Model| {
+        let names = model.links().iter().filter(|link| link.joint != Joint::Floating);
+        let names: Vec<String> = names.map(|link| link.name.clone()).collect();
+        let body = names.iter().enumerate().fold(ArticulatedBody::new("tree", model), |body, (i, name)| {
+            body.with_armature(name, 0.05 + 0.02 * (i % 7) as f64).expect("a joint with an armature")
+        });
+        body.model().clone()
+    };
+    let trees: Vec<Model> = trees().into_iter().map(with_rotors).collect();
+    let turned = |model: &Model| model.links().iter().any(|l| l.joint == Joint::Spherical && l.armature > 0.0);
+    assert!(trees.iter().filter(|model| turned(model)).count() > 20);
+    trees
+}
+
 #[test]
 fn derivatives_of_inverse_dynamics_are_its_slopes() {
+    check_inverse(&trees());
+}
+
+#[test]
+fn derivatives_of_inverse_dynamics_with_rotors_are_its_slopes() {
+    check_inverse(&trees_with_rotors());
+}
+
+fn check_inverse(trees: &[Model]) {
     let mut random = Random(5);
-    for model in trees() {
-        let (q, v) = random_state(&mut random, &model, 1.5);
+    for model in trees {
+        let (q, v) = random_state(&mut random, model, 1.5);
         let at = [q, v, random.numbers(model.dof(), 3.0)];
-        let d = inverse_dynamics_derivatives(&model, &mut Kinematics::new(&model), &G, &at[0], &at[1], &at[2]);
+        let d = inverse_dynamics_derivatives(model, &mut Kinematics::new(model), &G, &at[0], &at[1], &at[2]);
         let tau = |[q, v, qdd]: &[Vec<f64>; 3]| {
             let mut tau = vec![f64::NAN; model.dof()];
-            let work = (&mut Kinematics::new(&model), &mut InverseDynamics::new(&model));
-            inverse_dynamics(&model, work, &G, q, v, qdd, &[], &mut tau);
+            let work = (&mut Kinematics::new(model), &mut InverseDynamics::new(model));
+            inverse_dynamics(model, work, &G, q, v, qdd, &[], &mut tau);
             tau
         };
-        close(&d.by_q, &slopes(&model, &at, 0, &tau), "by q", &model);
-        close(&d.by_v, &slopes(&model, &at, 1, &tau), "by v", &model);
-        close(&d.by_qdd, &slopes(&model, &at, 2, &tau), "by qdd", &model);
+        close(&d.by_q, &slopes(model, &at, 0, &tau), "by q", model);
+        close(&d.by_v, &slopes(model, &at, 1, &tau), "by v", model);
+        close(&d.by_qdd, &slopes(model, &at, 2, &tau), "by qdd", model);
     }
 }
 
 #[test]
 fn derivatives_of_forward_dynamics_are_its_slopes() {
+    check_forward(&trees());
+}
+
+#[test]
+fn derivatives_of_forward_dynamics_with_rotors_are_its_slopes() {
+    check_forward(&trees_with_rotors());
+}
+
+fn check_forward(trees: &[Model]) {
     let mut random = Random(6);
-    for model in trees() {
-        let (q, v) = random_state(&mut random, &model, 1.5);
+    for model in trees {
+        let (q, v) = random_state(&mut random, model, 1.5);
         let at = [q, v, random.numbers(model.dof(), 3.0)];
-        let found = forward_dynamics_derivatives(&model, &mut Kinematics::new(&model), &G, &at[0], &at[1], &at[2]);
+        let found = forward_dynamics_derivatives(model, &mut Kinematics::new(model), &G, &at[0], &at[1], &at[2]);
         let d = found.expect("a tree with inertia at every joint");
         let qdd = |[q, v, tau]: &[Vec<f64>; 3]| {
             let mut qdd = vec![f64::NAN; model.dof()];
-            forward_dynamics(&mut Dynamics::new(&model), &G, q, v, tau, &mut qdd);
+            forward_dynamics(&mut Dynamics::new(model), &G, q, v, tau, &mut qdd);
             qdd
         };
         assert!(apart(d.qdd.as_slice(), &qdd(&at)) < 1e-8);
-        close(&d.by_q, &slopes(&model, &at, 0, &qdd), "by q", &model);
-        close(&d.by_v, &slopes(&model, &at, 1, &qdd), "by v", &model);
-        close(&d.by_tau, &slopes(&model, &at, 2, &qdd), "by tau", &model);
+        close(&d.by_q, &slopes(model, &at, 0, &qdd), "by q", model);
+        close(&d.by_v, &slopes(model, &at, 1, &qdd), "by v", model);
+        close(&d.by_tau, &slopes(model, &at, 2, &qdd), "by tau", model);
     }
 }
 
@@ -90,7 +124,7 @@ fn derivatives_of_forward_dynamics_are_its_slopes() {
 #[test]
 fn a_singular_mass_matrix_has_no_forward_derivatives() {
     use tumble_core::collide::Pose;
-    use tumble_core::{Joint, LinkMass, ModelBuilder};
+    use tumble_core::{LinkMass, ModelBuilder};
     let mut builder = ModelBuilder::new();
     builder.link("free of mass", None, Joint::revolute(Vec3::z()), Pose::identity(), LinkMass::none());
     builder.link("point", Some(0), Joint::prismatic(Vec3::z()), Pose::identity(), LinkMass::point(1.0, Vec3::zeros()));

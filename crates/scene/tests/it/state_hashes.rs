@@ -52,22 +52,22 @@ table! {
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
     bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "f6e9e6d3b6125c72";
     bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "95d1a5d8a2efe886";
-    chain_time_stepping: "chain", TimeStepping, "f47e2b35690a2684", "ee8524465209ed50";
-    chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
+    chain_time_stepping: "chain", TimeStepping, "6684822f2c0b1020", "f42518e923216b2d";
+    chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
     falling_time_stepping: "falling", TimeStepping, "0068eeac1a1f03dd", "bb641edf06048f32";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
     falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "3253ca0ba3cf7f3f";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
-    pendulum_time_stepping: "pendulum", TimeStepping, "a6f0f0b542061dc2", "63acd1d2fe930652";
+    pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
-    piston_time_stepping: "piston", TimeStepping, "ae876d8e7e8e345e", "bc01df0546e1951d";
-    piston_backtracking: "piston", Backtracking, "cebbc368133e0eb4", "ac9f392a7dadcd1e";
-    robot_time_stepping: "robot", TimeStepping, "4870548dea823eed", "32478defeba22eba";
-    robot_backtracking: "robot", Backtracking, "e22a5daebf15f621", "a38fc690488cc0b0";
-    skeleton_time_stepping: "skeleton", TimeStepping, "7c5c775c256c1284", "533cb39b249b8282";
-    skeleton_backtracking: "skeleton", Backtracking, "611dba4a2c85a4d3", "870cdb306e31ab83";
+    piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
+    piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
+    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "f3d2566244a33458";
+    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c82ac5e456d8f016";
+    skeleton_time_stepping: "skeleton", TimeStepping, "6a25cfcb500df86a", "55fd41b6b46116e2";
+    skeleton_backtracking: "skeleton", Backtracking, "ca2fb3da08c0a460", "09b1ab65352375a7";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -77,8 +77,8 @@ table! {
     [0.5, 2.0];
     ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "15a93b0a058b423c";
     ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "50a39ed5ff84a6aa";
-    bird_time_stepping: "bird", TimeStepping, "053882e764b94dcc", "e2df2c127e6dacd5";
-    bird_backtracking: "bird", Backtracking, "b927264344ce2024", "146adb12bfd53669";
+    bird_time_stepping: "bird", TimeStepping, "3d85f0ea42bb77db", "878264a194147426";
+    bird_backtracking: "bird", Backtracking, "1ce1e6f8cf5eb25d", "dcde02ee42013d37";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
     sparks_time_stepping: "sparks", TimeStepping, "b8077dc41b083964", "400afd684ba4d9c5";
     sparks_backtracking: "sparks", Backtracking, "e856d118294a5e88", "879fe126adcb8b24";
@@ -87,15 +87,15 @@ table! {
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "e6aff00ba5a5b496";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
-    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "8a992d40dc67236d";
+    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "e41387b64750eaec";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
-    steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "5c8c8e28cd5add5b";
-    steam_engine_backtracking: "steam_engine", Backtracking, "ce0a3badd81b48b4", "f65c1d0393337846";
+    steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
+    steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
     arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
-    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "3516c95fdc90d58f";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "999f55b2fdaf7618", "9e57e55efc92bfa2";
-    mechanism_time_stepping: "mechanism", TimeStepping, "7e2d4f05a0a39919", "df85d4c9a9b121eb";
-    dominoes_time_stepping: "dominoes", TimeStepping, "fe44a6680e801f5a", "c798dcaf8ca85ed0";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "5a92b18e025f41b9";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "c74f1a6abf5b03bb";
+    mechanism_time_stepping: "mechanism", TimeStepping, "9495d2cfa387718e", "11f9bfbe21d904d0";
+    dominoes_time_stepping: "dominoes", TimeStepping, "ba5c12be5e184a78", "2866037ea3023084";
 }
 
 table! {
@@ -104,8 +104,8 @@ table! {
     cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "14f546925b6b5f95";
     jelly_time_stepping: "jelly", TimeStepping, "1395fdace9fb6d7c", "0a30a4ebc5783f12";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
-    dominoes_backtracking: "dominoes", Backtracking, "94511c9695cd65a8", "4e9f28f0d690f8d4";
-    walker_backtracking: "walker", Backtracking, "ca535adb9b9b96d3", "093bfa105a94cd32";
-    mechanism_backtracking: "mechanism", Backtracking, "9f6247fa41a74b24", "abb36c4a32f75eb8";
-    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "1d7fafc6ac54b274", "9f5c6d9320b43b95";
+    dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
+    walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
+    mechanism_backtracking: "mechanism", Backtracking, "8b351f99db79742f", "58a65d135180d6c2";
+    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6ee8cd1aa8618179", "c32e6609d8484d51";
 }

@@ -265,18 +265,6 @@ impl<T: Scalar> Sweep<T> {
     #[inline(always)]
     pub fn run(&mut self, compiled: &Compiled, gravity: &Vec3, state: &impl Input<T>, out: impl FnMut(usize, T)) {
         self.place::<false>(compiled, state);
-        self.run_as_placed(compiled, gravity, state, out);
-    }
-
-    /// The rest of [`run`](Self::run), after the links are placed.
-    #[inline(always)]
-    pub fn run_as_placed(
-        &mut self,
-        compiled: &Compiled,
-        gravity: &Vec3,
-        state: &impl Input<T>,
-        out: impl FnMut(usize, T),
-    ) {
         for (i, body) in compiled.bodies.iter().enumerate().rev() {
             self.fold_link(i + 1, body);
             self.push_link(i + 1, body, state);
@@ -398,20 +386,34 @@ fn with_armature<T: Scalar>(pivot: T, armature: f64) -> T {
 /// Sets the rigid inertia and the bias `p` of a placed link.
 #[inline(always)]
 fn load<T: Scalar>(body: &CompiledLink, slot: &mut Slot<T>) {
-    let (rotational, [n, m]) = inertia_about_origin(body, &slot.rotation);
+    let (rotational, pair) = inertia_about_origin(body, &slot.rotation);
     let h = slot.rotation.of_constant(&body.moment);
-    let (omega, bias_acceleration) = (slot.angular, slot.bias_acceleration);
     let mass = slot.angular.x.constant(body.mass);
     slot.inertia = ArticulatedInertia::rigid(&Inertia { rotational, moment: h, mass });
+    slot.bias = bias_of(&rotational, pair, (h, mass), slot.angular, &slot.bias_acceleration);
+}
+
+/// Returns `p` of a link with the inertia `J`, which is made of a pair of vectors, the first moment `h` and the mass.
+#[inline(always)]
+pub(in crate::articulated) fn bias_of<T: Scalar>(
+    rotational: &Symmetric<T>,
+    [n, m]: [Vector<T>; 2],
+    (h, mass): (Vector<T>, T),
+    omega: Vector<T>,
+    bias_acceleration: &Motion<T>,
+) -> Force<T> {
     let spin = n * m.dot(omega) + m * n.dot(omega);
-    let torque = rotational * bias_acceleration.angular + omega.cross(spin) + h.cross(bias_acceleration.linear);
+    let torque = *rotational * bias_acceleration.angular + omega.cross(spin) + h.cross(bias_acceleration.linear);
     let force = bias_acceleration.linear * mass + bias_acceleration.angular.cross(h) + omega.cross(omega.cross(h));
-    slot.bias = Force { torque, force };
+    Force { torque, force }
 }
 
 /// Returns `J` of a link with these axes, and the pair of vectors that it is made of (`compiled.rs`).
 #[inline(always)]
-fn inertia_about_origin<T: Scalar>(body: &CompiledLink, rotation: &Matrix<T>) -> (Symmetric<T>, [Vector<T>; 2]) {
+pub(in crate::articulated) fn inertia_about_origin<T: Scalar>(
+    body: &CompiledLink,
+    rotation: &Matrix<T>,
+) -> (Symmetric<T>, [Vector<T>; 2]) {
     let (n, m) = (rotation.of_constant(&body.pair[0]), rotation.of_constant(&body.pair[1]));
     let paired = Symmetric::of_pair(n, m);
     let sphere = n.x.constant(body.sphere);

@@ -44,6 +44,8 @@ pub struct Dynamics {
     singular: Option<usize>,
     /// Zeros, one per degree of freedom.
     no_force: Vec<f64>,
+    /// `q` and `v` of the last refresh; empty once anything else was done.
+    at: Vec<f64>,
 }
 
 /// Buffers of one call, for the maps that take `&self`. Made by [`Dynamics::scratch`]; no data is
@@ -64,6 +66,7 @@ impl Dynamics {
             roots: vec![[0.0; 2]; compiled.bodies.len() + 1],
             joint_sin_cos: JointSinCos::new(&compiled),
             no_force: vec![0.0; compiled.dof],
+            at: Vec::with_capacity(compiled.positions + compiled.dof),
             compiled,
             sweep,
             singular: None,
@@ -72,7 +75,23 @@ impl Dynamics {
 
     /// Takes masses and armatures of the model, from the next [`refresh`](Self::refresh) on.
     pub(in crate::articulated) fn set_inertias(&mut self, model: &Model) {
-        self.compiled.set_inertias(model);
+        if self.compiled.set_inertias(model) {
+            self.at.clear();
+        }
+    }
+
+    /// Does what [`refresh`](Self::refresh) does, unless that was the last thing done, at the same bits. Returns whether it did.
+    pub(in crate::articulated) fn refresh_once(&mut self, q: &[f64], v: &[f64]) -> bool {
+        let moved = !(self.is_at(q) && same(&self.at[q.len()..], v));
+        if moved {
+            self.refresh(q, v);
+        }
+        moved
+    }
+
+    /// Returns whether the last [`refresh`](Self::refresh) was at these positions, with the present inertias.
+    pub(in crate::articulated) fn is_at(&self, q: &[f64]) -> bool {
+        self.at.len() > q.len() && same(&self.at[..q.len()], q)
     }
 
     /// Returns the number of moving links.
@@ -129,10 +148,13 @@ impl Dynamics {
                 self.singular = Some(i);
             }
         }
+        self.at.clear();
+        self.at.extend(q.iter().chain(v));
     }
 
     /// Returns the kinetic energy at a state, J. Afterwards the maps need a [`refresh`](Self::refresh).
     pub(in crate::articulated) fn kinetic_energy(&mut self, q: &[f64], v: &[f64]) -> f64 {
+        self.at.clear();
         let turns = self.joint_sin_cos.take(q);
         self.sweep.place_for_energy(&self.compiled, &SingleState { turns, q, v, tau: &[] });
         kinetic_energy_as_placed(&self.compiled, &self.sweep, v)
@@ -140,24 +162,10 @@ impl Dynamics {
 
     /// Writes `q̈` without any force to `qdd`. Afterwards the maps need a [`refresh`](Self::refresh).
     pub(in crate::articulated) fn free_acceleration(&mut self, q: &[f64], v: &[f64], qdd: &mut [f64]) {
+        self.at.clear();
         let Dynamics { compiled, sweep, joint_sin_cos, no_force, .. } = self;
         let turns = joint_sin_cos.take(q);
         sweep.run(compiled, &Vec3::zeros(), &SingleState { turns, q, v, tau: no_force }, |k, x| qdd[k] = x);
-    }
-
-    /// [`free_acceleration`](Self::free_acceleration), and returns the kinetic energy, J.
-    pub(in crate::articulated) fn free_acceleration_and_energy(
-        &mut self,
-        q: &[f64],
-        v: &[f64],
-        qdd: &mut [f64],
-    ) -> f64 {
-        let Dynamics { compiled, sweep, joint_sin_cos, no_force, .. } = self;
-        let state = SingleState { turns: joint_sin_cos.take(q), q, v, tau: no_force };
-        sweep.place::<true>(compiled, &state);
-        let kinetic = kinetic_energy_as_placed(compiled, sweep, v);
-        sweep.run_as_placed(compiled, &Vec3::zeros(), &state, |k, x| qdd[k] = x);
-        kinetic
     }
 
     /// Returns the first link whose joint meets no inertia at the refreshed state, as in gimbal
@@ -288,9 +296,15 @@ fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> 
 /// Writes `q̈` from `q`, `v` and joint forces `tau` in uniform gravity, in one pass. Afterwards the
 /// maps of `d` need a [`Dynamics::refresh`].
 pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
+    d.at.clear();
     let Dynamics { compiled, sweep, joint_sin_cos, .. } = d;
     let turns = joint_sin_cos.take(q);
     sweep.run(compiled, gravity, &SingleState { turns, q, v, tau }, |k, x| qdd[k] = x);
+}
+
+/// Returns whether numbers have the same bits.
+fn same(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
 /// One state as the input of a sweep.

@@ -4,12 +4,24 @@
 //! q̈ = −M⁻¹·C(q, q̇)          the geodesics of the kinetic energy T = ½ q̇ᵀM(q)q̇
 //! ```
 //!
-//! One step of the classical Runge–Kutta method on `q̇` and of its commutator-free form on
-//! positions (see `integrators/context.rs`). Then `q̇` is scaled so that `T` is conserved. A
+//! One step of Nyström's method of fourth order, with `a(q, v) = q̈`:
+//!
+//! ```text
+//! a₁ = a(q, v)                                     a₂ = a(q ⊕ (½h·v + ⅛h²·a₁), v + ½h·a₁)
+//! a₃ = a(q ⊕ (½h·v + ⅛h²·a₁), v + ½h·a₂)           a₄ = a(q ⊕ (h·v + ½h²·a₃), v + h·a₃)
+//! q' = q ⊕ (h·v + ⅙h²·(a₁ + a₂ + a₃))              v' = v + ⅙h·(a₁ + 2a₂ + 2a₃ + a₄)
+//! ```
+//!
+//! It has four stages at three places, and the first is where the body is: of the four evaluations two need new poses and
+//! inertias. A rotation vector `θ` of a spherical joint or a floating root also has the first term of Magnus's series, `θ̇ = ω ∓ ½·θ×ω`, which is
+//! `∓¹⁄₁₂·h³·ω×ω̇` of a stage, and `∓¹⁄₁₂·h²·ω×ω'` of the step: the next one is of the fifth order.
+//!
+//! Then `q̇` is scaled so that `T` is conserved. A
 //! geodesic traversed at another speed is the same geodesic, so the scaling does not reduce the
 //! order. Free motion then never gains energy, however long the step.
 
-use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
+use crate::articulated::algorithms::dynamics::Dynamics;
+use crate::articulated::algorithms::same_place::LinkRates;
 use crate::articulated::model::Model;
 use crate::articulated::model::coordinates::{integrate, read_vector};
 use crate::articulated::model::joint::Joint;
@@ -20,80 +32,61 @@ use crate::articulated::model::joint::Joint;
 #[derive(Clone, Debug)]
 pub(in crate::articulated) struct FreeMotion {
     dynamics: Dynamics,
-    scratch: Scratch,
-    /// States at the start, at a stage, and at stage 2.
-    start: Vec<f64>,
+    links: Vec<LinkRates>,
+    /// A state at a stage.
     stage: Vec<f64>,
-    second: Vec<f64>,
-    /// Velocities and accelerations of the four stages.
-    v: [Vec<f64>; 4],
+    /// Accelerations of the four stages.
     a: [Vec<f64>; 4],
-    /// A combination of stages, or a whitened velocity.
+    /// A displacement, or a sum of rates.
     sum: Vec<f64>,
-    zeros: Vec<f64>,
 }
 
 impl FreeMotion {
     /// Prepares a model, whose dynamics are `dynamics` at any state.
     pub fn new(dynamics: &Dynamics) -> FreeMotion {
-        let (state, dof) = (vec![0.0; dynamics.positions() + dynamics.dof()], vec![0.0; dynamics.dof()]);
+        let dof = vec![0.0; dynamics.dof()];
         FreeMotion {
             dynamics: dynamics.clone(),
-            scratch: dynamics.scratch(),
-            start: state.clone(),
-            stage: state.clone(),
-            second: state,
-            v: std::array::from_fn(|_| dof.clone()),
+            links: dynamics.link_rates(),
+            stage: vec![0.0; dynamics.positions() + dynamics.dof()],
             a: std::array::from_fn(|_| dof.clone()),
-            sum: dof.clone(),
-            zeros: dof,
+            sum: dof,
         }
     }
 
-    /// Advances `x = [q, v]` by `h` seconds of free motion.
-    pub fn advance(&mut self, model: &Model, x: &mut [f64], h: f64) {
+    /// Advances `x = [q, v]` by `h` seconds of free motion. `known` spares the dynamics at `q` if they are those.
+    pub fn advance(&mut self, model: &Model, known: &Dynamics, x: &mut [f64], h: f64) {
         self.dynamics.set_inertias(model); // they may have changed since the last call
         let n = model.positions();
         if h == 0.0 || x[n..].iter().all(|v| *v == 0.0) {
             return;
         }
-        self.start.copy_from_slice(x);
-        self.stage.copy_from_slice(x);
-        let mut energy = 0.0;
-        for s in 0..4 {
-            let (q, v) = self.stage.split_at(n);
-            if s == 0 {
-                energy = self.dynamics.free_acceleration_and_energy(q, v, &mut self.a[s]);
-            } else {
-                self.dynamics.free_acceleration(q, v, &mut self.a[s]);
-            }
-            self.v[s].copy_from_slice(v);
-            match s {
-                0 | 1 => {
-                    self.stage.copy_from_slice(&self.start);
-                    step(model, &mut self.stage, &self.v[s], &self.a[s], 0.5 * h);
-                    if s == 0 {
-                        self.second.copy_from_slice(&self.stage);
-                    }
-                }
-                2 => {
-                    // positions go on from stage 2, velocities from the start
-                    self.stage.copy_from_slice(&self.second);
-                    combine(&self.v, [-0.5, 0.0, 1.0, 0.0], &mut self.sum);
-                    integrate(model, &mut self.stage[..n], &self.sum, h);
-                    let accelerated = self.start[n..].iter().zip(&self.a[2]).map(|(v, a)| v + h * a);
-                    self.stage[n..].iter_mut().zip(accelerated).for_each(|(v, end)| *v = end);
-                }
-                _ => {}
-            }
+        let FreeMotion { dynamics, links, stage, a: [first, second, third, fourth], sum } = self;
+        let (q, v) = x.split_at_mut(n);
+        let energy = if known.is_at(q) {
+            known.free_acceleration_again::<true>(links, v, first)
+        } else {
+            dynamics.refresh(q, v);
+            dynamics.free_acceleration_again::<true>(links, v, first)
+        };
+        let (place, speed) = stage.split_at_mut(n);
+        displacement(model, (v, first), 0.5 * h, sum);
+        reach(model, q, sum, place);
+        add(v, first, 0.5 * h, speed);
+        dynamics.free_acceleration(place, speed, second);
+        add(v, second, 0.5 * h, speed);
+        dynamics.free_acceleration_again::<false>(links, speed, third);
+        displacement(model, (v, third), h, sum);
+        reach(model, q, sum, place);
+        add(v, third, h, speed);
+        dynamics.free_acceleration(place, speed, fourth);
+        for (i, sum) in sum.iter_mut().enumerate() {
+            *sum = h * v[i] + h * h / 6.0 * (first[i] + second[i] + third[i]);
+            speed[i] = v[i] + h / 6.0 * (first[i] + 2.0 * (second[i] + third[i]) + fourth[i]);
         }
-        let (sixth, twelfth) = (1.0 / 6.0, 1.0 / 12.0);
-        combine(&self.a, [sixth, 2.0 * sixth, 2.0 * sixth, sixth], &mut self.sum);
-        x[n..].iter_mut().zip(&self.sum).for_each(|(v, a)| *v += h * a);
-        combine(&self.v, [3.0 * twelfth, 2.0 * twelfth, 2.0 * twelfth, -twelfth], &mut self.sum);
-        integrate(model, &mut x[..n], &self.sum, h);
-        combine(&self.v, [-twelfth, 2.0 * twelfth, 2.0 * twelfth, 3.0 * twelfth], &mut self.sum);
-        integrate(model, &mut x[..n], &self.sum, h);
+        add_turning(model, (v, speed), h * h / 12.0, sum);
+        integrate(model, q, sum, 1.0);
+        v.copy_from_slice(speed);
         self.scale_to(energy, n, x);
     }
 
@@ -129,23 +122,14 @@ impl FreeMotion {
     /// Writes `−Γ(d, v)` at the stage to `sum`.
     fn transport_rate(&mut self, model: &Model, d: &[f64], stretch: f64) {
         let (q, v) = self.stage.split_at(model.positions());
-        for (k, s) in [stretch, -stretch].into_iter().enumerate() {
-            self.sum.iter_mut().zip(v).zip(d).for_each(|((sum, v), d)| *sum = v + s * d);
-            self.dynamics.refresh(q, &self.sum);
-            self.dynamics.accelerate(&mut self.scratch, &self.zeros, &[], &mut self.a[k]);
-        }
-        let [more, less, ..] = &self.a;
-        let difference = more.iter().zip(less).map(|(more, less)| (more - less) / (4.0 * stretch));
+        let [more, less, ..] = &mut self.a;
+        add(v, d, stretch, &mut self.sum);
+        self.dynamics.free_acceleration(q, &self.sum, more);
+        add(v, d, -stretch, &mut self.sum);
+        self.dynamics.free_acceleration_again::<false>(&mut self.links, &self.sum, less);
+        let difference = more.iter().zip(&*less).map(|(more, less)| (more - less) / (4.0 * stretch));
         self.sum.iter_mut().zip(difference).for_each(|(sum, rate)| *sum = rate);
-        for link in model.links() {
-            let sign = match link.joint {
-                Joint::Spherical => -0.5,
-                Joint::Floating => 0.5,
-                _ => continue,
-            };
-            let turn = sign * read_vector(&d[link.v..]).cross(&read_vector(&v[link.v..]));
-            self.sum[link.v..link.v + 3].iter_mut().zip(turn.iter()).for_each(|(rate, turn)| *rate += turn);
-        }
+        add_turning(model, (d, v), -0.5, &mut self.sum);
     }
 
     /// Scales the velocities of `x` to a kinetic energy, if that is finite.
@@ -163,10 +147,123 @@ fn step(model: &Model, x: &mut [f64], v: &[f64], rate: &[f64], h: f64) {
     x[n..].iter_mut().zip(rate).for_each(|(v, a)| *v += h * a);
 }
 
-/// Writes `Σ weight·k`. A stage of weight 0 is not read: it may be one of an earlier step, which
-/// failed with numbers that are not finite.
-fn combine(k: &[Vec<f64>; 4], weight: [f64; 4], sum: &mut [f64]) {
-    for (i, sum) in sum.iter_mut().enumerate() {
-        *sum = k.iter().zip(weight).filter(|(_, w)| *w != 0.0).map(|(k, w)| w * k[i]).sum();
+/// Writes `a + h·b`.
+fn add(a: &[f64], b: &[f64], h: f64, out: &mut [f64]) {
+    out.iter_mut().zip(a).zip(b).for_each(|((out, a), b)| *out = a + h * b);
+}
+
+/// Writes where the positions `q` are after a displacement.
+fn reach(model: &Model, q: &[f64], displacement: &[f64], out: &mut [f64]) {
+    out.copy_from_slice(q);
+    integrate(model, out, displacement, 1.0);
+}
+
+/// Writes the displacement in `h` seconds with a constant acceleration, to the third order of rotations.
+fn displacement(model: &Model, (v, a): (&[f64], &[f64]), h: f64, out: &mut [f64]) {
+    out.iter_mut().zip(v).zip(a).for_each(|((out, v), a)| *out = h * v + 0.5 * h * h * a);
+    add_turning(model, (v, a), h * h * h / 12.0, out);
+}
+
+/// Adds to `out` the bracket of two velocities times `h`: `b×a` of the world's axes, of a floating root, `a×b` of a link's own, of a
+/// spherical joint.
+fn add_turning(model: &Model, (a, b): (&[f64], &[f64]), h: f64, out: &mut [f64]) {
+    for link in model.links() {
+        let h = match link.joint {
+            Joint::Spherical => h,
+            Joint::Floating => -h,
+            _ => continue,
+        };
+        let turn = h * read_vector(&a[link.v..]).cross(&read_vector(&b[link.v..]));
+        out[link.v..link.v + 3].iter_mut().zip(turn.iter()).for_each(|(out, turn)| *out += turn);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::articulated::model::{LinkMass, ModelBuilder};
+    use crate::articulated::{difference, forward_dynamics};
+    use tumble_collide::{Mat3, Pose, Vec3};
+
+    /// A floating root with a spherical, a revolute and a prismatic joint, none of them symmetric.
+    fn tree() -> Model {
+        let mass = |m: f64, center: Vec3| LinkMass {
+            mass: m,
+            center,
+            inertia: Mat3::from_diagonal(&Vec3::new(0.03 * m, 0.05 * m, 0.04 * m)),
+        };
+        let mut builder = ModelBuilder::new();
+        let root = builder.link("root", None, Joint::Floating, Pose::identity(), mass(2.0, Vec3::new(0.1, 0.0, 0.05)));
+        let ball = Pose::translation(0.3, 0.1, 0.0);
+        let arm = builder.link("arm", Some(root), Joint::Spherical, ball, mass(1.0, Vec3::new(0.2, 0.0, -0.3)));
+        let hinge = Pose::translation(0.4, 0.0, 0.0);
+        let hand =
+            builder.link("hand", Some(arm), Joint::revolute(Vec3::y()), hinge, mass(0.5, Vec3::new(0.2, 0.1, 0.0)));
+        let slide = Joint::prismatic(Vec3::x());
+        builder.link("finger", Some(hand), slide, Pose::translation(0.1, 0.0, 0.0), mass(0.3, Vec3::zeros()));
+        builder.build().expect("a sound tree")
+    }
+
+    fn start(model: &Model) -> Vec<f64> {
+        let mut x = vec![0.0; model.positions() + model.dof()];
+        (x[6], x[10]) = (1.0, 1.0); // quaternions of no turn
+        let v = [2.0, -1.0, 1.5, 0.3, 0.1, -0.2, -2.0, 1.0, 1.5, 3.0, 0.2];
+        x[model.positions()..].copy_from_slice(&v);
+        x
+    }
+
+    /// Half a second in `steps` steps of free motion; `known` has the dynamics of each start at hand.
+    fn end(model: &Model, steps: usize, known: bool) -> Vec<f64> {
+        let mut dynamics = Dynamics::new(model);
+        let (mut motion, mut x) = (FreeMotion::new(&dynamics), start(model));
+        for _ in 0..steps {
+            if known {
+                let (q, v) = x.split_at(model.positions());
+                dynamics.refresh(q, v);
+            }
+            motion.advance(model, &dynamics, &mut x, 0.5 / steps as f64);
+        }
+        x
+    }
+
+    /// The explicit midpoint rule.
+    fn reference(model: &Model, steps: usize) -> Vec<f64> {
+        let (n, h) = (model.positions(), 0.5 / steps as f64);
+        let (mut dynamics, mut x) = (Dynamics::new(model), start(model));
+        let (mut a, zeros) = (vec![0.0; model.dof()], vec![0.0; model.dof()]);
+        for _ in 0..steps {
+            let mut middle = x.clone();
+            for (from, h) in [(x.clone(), 0.5 * h), (Vec::new(), h)] {
+                let at = if from.is_empty() { middle.clone() } else { from };
+                forward_dynamics(&mut dynamics, &Vec3::zeros(), &at[..n], &at[n..], &zeros, &mut a);
+                middle.copy_from_slice(&x);
+                step(model, &mut middle, &at[n..], &a, h);
+            }
+            x = middle;
+        }
+        x
+    }
+
+    fn apart(model: &Model, a: &[f64], b: &[f64]) -> f64 {
+        let (n, mut way) = (model.positions(), vec![0.0; model.dof()]);
+        difference(model, &a[..n], &b[..n], &mut way);
+        way.iter().copied().chain(a[n..].iter().zip(&b[n..]).map(|(a, b)| a - b)).map(f64::abs).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn free_motion_is_of_fourth_order_and_that_of_forward_dynamics() {
+        let model = tree();
+        let fine = end(&model, 2560, false);
+        let [coarse, half] = [80, 160].map(|steps| apart(&model, &end(&model, steps, false), &fine));
+        assert!((3.7..4.3).contains(&(coarse / half).log2()), "{coarse:e} {half:e}");
+        // the errors of the midpoint rule are of second order: one extrapolation to none
+        let [far, near] = [10_000, 20_000].map(|steps| apart(&model, &reference(&model, steps), &fine));
+        assert!(near < 1e-6 && (3.9..4.1).contains(&(far / near)), "{far:e} {near:e}");
+    }
+
+    #[test]
+    fn dynamics_at_hand_change_no_bit() {
+        let model = tree();
+        assert_eq!(end(&model, 20, true), end(&model, 20, false));
     }
 }

@@ -11,4 +11,5 @@ pub(in crate::articulated) mod free_motion;
 pub(in crate::articulated) mod jacobian;
 pub(in crate::articulated) mod kinematics;
 pub(in crate::articulated) mod rnea;
+pub(in crate::articulated) mod same_place;
 pub(in crate::articulated) mod whiten;

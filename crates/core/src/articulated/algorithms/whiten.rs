@@ -99,10 +99,16 @@ impl Dynamics {
         }
     }
 
-    /// Writes `y = L⁻ᵀ j`: the whitened response to generalized impulses.
+    /// Writes `y = L⁻ᵀ j`: the whitened response to generalized impulses. Joints without an impulse on
+    /// them or beyond them cost nothing.
     pub fn solve_lt(&self, s: &mut Scratch, j: &[f64], y: &mut [f64]) {
         s.forces.fill(Force::default());
+        y.fill(0.0);
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
+            let own = &j[body.v..body.v + body.kind.dof()];
+            if own.iter().all(|j| *j == 0.0) && s.forces[i + 1] == Force::default() {
+                continue;
+            }
             let passed = self.solve_lt_link(i + 1, body, s.forces[i + 1], |k| j[k], |k, x| y[k] = x);
             s.forces[body.parent] += passed;
         }

@@ -31,6 +31,17 @@ pub(in crate::articulated) enum JointKind {
     Floating(usize),
 }
 
+impl JointKind {
+    /// Returns the number of degrees of freedom.
+    pub fn dof(self) -> usize {
+        match self {
+            JointKind::Revolute | JointKind::Prismatic => 1,
+            JointKind::Spherical(_) => 3,
+            JointKind::Floating(_) => 6,
+        }
+    }
+}
+
 /// One link. Lengths and axes are in inner frames: the parent's for the placement, its own for the
 /// mass.
 #[derive(Clone, Debug)]
@@ -71,10 +82,10 @@ pub(in crate::articulated) struct Compiled {
 }
 
 impl Compiled {
-    /// Takes masses and armatures of the model, which may change between steps.
-    pub fn set_inertias(&mut self, model: &Model) {
+    /// Takes masses and armatures of the model, which may change between steps. Returns whether they did.
+    pub fn set_inertias(&mut self, model: &Model) -> bool {
         if self.inertias.are(&model.inertias) {
-            return;
+            return false;
         }
         self.inertias = model.inertias.clone();
         for (body, link) in self.bodies.iter_mut().zip(model.links()) {
@@ -82,6 +93,7 @@ impl Compiled {
             body.moment = moment(&link.mass, &body.own);
             (body.sphere, body.pair) = biaxial(&link.mass, &body.own);
         }
+        true
     }
 
     pub fn new(model: &Model) -> Compiled {

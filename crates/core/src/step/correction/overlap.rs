@@ -38,6 +38,7 @@ use crate::linearize::Switch;
 use crate::object::RowTarget;
 use crate::solver::SolverSettings;
 use crate::world::Core;
+use smallvec::SmallVec;
 
 /// Share of the work that is left in a correction before a sub-step of `backtracking`.
 const IN_PLACE: f64 = 0.25;
@@ -143,21 +144,24 @@ pub(super) fn separate(
 }
 
 /// Writes the rate of every row's error in the step to `work.c`: to first order, or the mean rate
-/// of the measured gaps.
+/// of the measured gaps. It is 0 for soft rows, which have no part in this.
 fn predict(work: &mut Workspace, gaps: &[Limit], contacts: Contacts, h: f64) {
     let first = work.contact_constraints.len();
+    let measured = work.limits.iter().zip(gaps).filter(|(limit, end)| limit.key == end.key);
+    let measured = measured.filter_map(|(limit, end)| Some((limit.target? as usize, end.gap)));
+    let mut known = SmallVec::<[bool; 128]>::from_elem(false, work.targets.len());
+    measured.clone().for_each(|(target, _)| known[target] = true);
     for (b, block) in work.rows.blocks.iter().enumerate() {
-        let target = b.checked_sub(first).map_or(0.0, |i| work.targets[i].velocity);
-        work.c[block.row as usize] = match contacts {
-            Contacts::Moved { mean } => work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean) - target,
-            Contacts::InPlace | Contacts::Ignored => 0.0,
+        let target = b.checked_sub(first).map(|i| (&work.targets[i], known[i]));
+        let rate = |mean: &[f64]| work.bias[block.row as usize] + work.rows.row_velocity(block, 0, mean);
+        work.c[block.row as usize] = match (contacts, target) {
+            (Contacts::InPlace | Contacts::Ignored, _) | (_, Some((_, true))) => 0.0,
+            (_, Some((target, _))) if target.compliance > 0.0 => 0.0,
+            (Contacts::Moved { mean }, target) => rate(mean) - target.map_or(0.0, |(target, _)| target.velocity),
         };
     }
-    for (limit, end) in work.limits.iter().zip(gaps).filter(|(limit, end)| limit.key == end.key) {
-        if let Some(target) = limit.target.map(|t| t as usize) {
-            let row = work.rows.blocks[first + target].row as usize;
-            work.c[row] = (end.gap - work.targets[target].error) / h;
-        }
+    for (target, gap) in measured {
+        work.c[work.rows.blocks[first + target].row as usize] = (gap - work.targets[target].error) / h;
     }
 }
 

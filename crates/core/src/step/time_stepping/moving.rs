@@ -52,8 +52,13 @@ impl FreeTerms {
     /// Returns the change of a row's velocity by half a step of free motion, and the rate of it that
     /// is no acceleration.
     pub fn of_row(&self, rows: &Rows, block: &Block, row: usize) -> (f64, f64) {
-        let of = |v: &Option<Vec<f64>>| v.as_ref().map_or(0.0, |v| rows.row_velocity(block, row, v));
-        (of(&self.change), of(&self.turning))
+        let change = self.change.as_ref().map_or(0.0, |v| rows.row_velocity(block, row, v));
+        (change, self.turning_of_row(rows, block, row))
+    }
+
+    /// Returns the rate of a row's velocity in free motion that is no acceleration.
+    pub fn turning_of_row(&self, rows: &Rows, block: &Block, row: usize) -> f64 {
+        self.turning.as_ref().map_or(0.0, |v| rows.row_velocity(block, row, v))
     }
 }
 
