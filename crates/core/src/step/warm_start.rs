@@ -8,24 +8,37 @@ use crate::contact::wrench::Wrench;
 use crate::world::Core;
 use tumble_collide::Vec3;
 
+/// Contacts of a pair are at the same place within this fraction of the distance over which its contacts extend.
+const SAME_PLACE: f64 = 0.05;
+
 /// Sets multipliers of contacts to the forces of the last sub-step, in the present contact frames, times
-/// `scale`. Contacts that are gone leave their force and torque to those of their pair that touch.
+/// `scale`. Contacts that are gone leave their force to a new one at their place, else force and torque to those of
+/// their pair that touch.
 /// The solver projects the multipliers onto the cone.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     let (mut place, mut first) = (0, 0);
-    let mut forces = Vec::new();
+    let (mut forces, mut known, mut lost, mut points) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for contacts in work.contact_constraints.chunk_by(|a, b| a.key.pair == b.key.pair) {
         let blocks = &work.rows.blocks[first..first + contacts.len()];
         first += contacts.len();
         let pose = &core.derived.part_states[contacts[0].a as usize].pose;
         forces.clear();
         forces.resize(contacts.len(), Vec3::zeros());
-        let mut gone = Wrench::default();
+        known.clear();
+        known.resize(contacts.len(), false);
+        lost.clear();
         for warm in core.state.warm.of_pair(contacts[0].key.pair, &mut place) {
             match contacts.iter().position(|t| t.key == warm.key) {
-                Some(i) => forces[i] = Vec3::from(warm.force),
-                None => gone.add(&pose.transform_point(&warm.point.into()).coords, &Vec3::from(warm.force)),
+                Some(i) => (forces[i], known[i]) = (Vec3::from(warm.force), true),
+                None => lost.push((pose.transform_point(&warm.point.into()).coords, Vec3::from(warm.force))),
             }
+        }
+        let mut gone = Wrench::default();
+        if !lost.is_empty() {
+            points.clear();
+            points.extend(contacts.iter().map(|t| t.contact.point));
+            hand_over(&points, &mut known, &mut lost, &mut forces);
+            lost.iter().for_each(|(point, force)| gone.add(point, force));
         }
         if gone.force != Vec3::zeros() {
             let touches = |t: &ContactConstraint| t.contact.gap <= core.settings.drift_tolerance;
@@ -50,6 +63,22 @@ pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     }
 }
 
+/// Gives forces of contacts that are gone to new ones at the same place, and keeps the others in `lost`, each with its
+/// place: an edge that ends where the face beneath it ends is cut there or ends by itself, as rounding decides.
+fn hand_over(points: &[Vec3], known: &mut [bool], lost: &mut Vec<(Vec3, Vec3)>, forces: &mut [Vec3]) {
+    let apart = |a: &Vec3, b: &Vec3| (a - b).norm_squared();
+    let extent = points.iter().map(|point| apart(point, &points[0])).fold(0.0, f64::max);
+    lost.retain(|(place, force)| {
+        let new = points.iter().enumerate().filter(|(i, _)| !known[*i]);
+        let nearest = new.map(|(i, point)| (i, apart(point, place))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _)) = nearest.filter(|(_, square)| *square <= SAME_PLACE * SAME_PLACE * extent) else {
+            return true;
+        };
+        (forces[i], known[i]) = (*force, true);
+        false
+    });
+}
+
 /// Returns the forces of the constraints' rows: multipliers `lambda` times `scale`.
 pub(super) fn row_starts(work: &Workspace, lambda: &[f64], scale: f64) -> Vec<RowStart> {
     let blocks = &work.rows.blocks[work.contact_constraints.len()..];
@@ -59,4 +88,30 @@ pub(super) fn row_starts(work: &Workspace, lambda: &[f64], scale: f64) -> Vec<Ro
         starts.extend(forces.map(|force| RowStart { owner: *owner, force }));
     }
     starts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners of a face: one is known, one is found again a little off, and one is gone for good.
+    #[test]
+    fn forces_go_to_new_contacts_at_the_same_place_only() {
+        let points = [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)].map(|(x, y)| Vec3::new(x, y, 0.0));
+        let force = |z: f64| Vec3::new(0.0, 0.0, z);
+        let mut known = [true, false, false, false];
+        let mut forces = [force(1.0), force(0.0), force(0.0), force(0.0)];
+        let near_known = (Vec3::new(0.01, 0.0, 0.0), force(9.0));
+        let far = (Vec3::new(0.5, 1.0, 0.0), force(5.0));
+        let mut lost = vec![(Vec3::new(1.0, 2.001, 0.0), force(3.0)), near_known, far];
+        hand_over(&points, &mut known, &mut lost, &mut forces);
+        assert_eq!(lost, [near_known, far]);
+        assert_eq!(forces, [force(1.0), force(0.0), force(3.0), force(0.0)]);
+        assert_eq!(known, [true, false, true, false]);
+        // a contact takes the force of one other at most
+        let again = (Vec3::new(1.0, 1.999, 0.0), force(4.0));
+        lost = vec![again];
+        hand_over(&points, &mut known, &mut lost, &mut forces);
+        assert_eq!(lost, [again]);
+    }
 }
