@@ -177,6 +177,7 @@ impl Backtracking {
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
             let options = Options {
                 h: left,
+                impulses: None,
                 level: self.level,
                 start: &[],
                 contacts: Contacts::InPlace,
@@ -471,6 +472,7 @@ impl Backtracking {
     fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
         let options = Options {
             h,
+            impulses: None,
             level: self.level,
             start,
             contacts: Contacts::Ignored,

@@ -322,7 +322,7 @@ impl TimeStepping {
         write(mean, n, |i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         rest.clone_from(mean);
         self.work.frictionless.du.clear();
-        self.correct(core, middle, h)?;
+        self.correct(core, middle, h, ([u0, u1], du_force))?;
         let Buffers { dp, total, keep, moved, rest: mean, end, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));
