@@ -54,7 +54,7 @@ use group::{Group, Round, by_start, entry_at};
 use joint_work::Before;
 
 pub(super) use errors::{ActiveLimit, Limits, limits_with_force};
-pub(super) use joint_work::Impulses;
+pub(super) use joint_work::{Impulses, Velocities};
 pub(crate) use overlap::Frictionless;
 
 /// Number of sweeps per round in a group that is too large for a direct solve.
@@ -187,7 +187,7 @@ fn correct_at(
         }
     }
     if let Some((acting, impulses)) = acting.as_deref_mut().zip(options.impulses) {
-        let before = Before { impulses, work, acting, arrived: &arrived, moved: &moved, pushed: &pushed, h: options.h };
+        let before = Before { impulses, work, acting, arrived: &arrived, moved: &moved, pushed: &pushed };
         joint_work::balance(core, end, before, &groups);
     }
     let open: Vec<&Group> = groups.iter().filter(|group| group.is_open(core)).collect();

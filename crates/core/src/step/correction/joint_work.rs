@@ -46,14 +46,21 @@ const MOST: f64 = 0.5;
 /// The impulses of a step.
 #[derive(Clone, Copy)]
 pub(in super::super) struct Impulses<'a> {
-    /// Whitened velocities before and after, without the correction.
-    pub u: [&'a [f64]; 2],
-    /// Change of velocity by forces.
-    pub du_force: &'a [f64],
+    /// Velocities before and after, without the correction.
+    pub velocities: Velocities<'a>,
+    /// Whitened change of velocity by forces in a time, s.
+    pub du_force: (&'a [f64], f64),
     /// Impulse of a multiplier 1: 1 s, or the length of the step for forces, s.
     pub scale: f64,
     /// Per coordinate, whether something strikes the object.
     pub struck: &'a [bool],
+}
+
+/// Velocities of all objects at the time of an impulse.
+#[derive(Clone, Copy)]
+pub(in super::super) enum Velocities<'a> {
+    Whitened([&'a [f64]; 2]),
+    Generalized([&'a [f64]; 2]),
 }
 
 /// The step before its correction.
@@ -67,16 +74,16 @@ pub(super) struct Before<'a> {
     pub moved: &'a [f64],
     /// Per coordinate, whether a contact pushes in the island.
     pub pushed: &'a [bool],
-    pub h: f64,
 }
 
 /// Returns the work of the joints of the groups to their motion, at the corrected moment `end`.
 pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[Group]) {
-    let Before { impulses, work, acting, arrived, moved, pushed, h } = before;
+    let Before { impulses, work, acting, arrived, moved, pushed } = before;
     let contacts = work.contact_constraints.len();
     let entries = by_start(core.objects());
     let mut du = vec![0.0; core.dof];
     let tolerance = core.settings.contact_tolerance;
+    let (mut before, mut after) = (vec![0.0; core.dof], vec![0.0; core.dof]);
     for group in groups {
         let rows = || group.rows.iter().map(|&i| (i as usize, &work.rows.blocks[contacts + i as usize]));
         let is_ideal = |(i, block): (usize, &Block)| {
@@ -93,8 +100,18 @@ pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[G
         if !group.closed() || !group.ranges.iter().all(|(_, v)| free(v.start)) || !rows().all(is_ideal) {
             continue;
         }
+        for entry in objects() {
+            let Some(body) = entry.object.integratable() else { continue };
+            let (v, cache) = (entry.state_range.v.clone(), &mut acting.derived.caches[entry.place]);
+            for (u, k) in [(&mut before, 0), (&mut after, 1)] {
+                match impulses.velocities {
+                    Velocities::Whitened(all) => u[v.clone()].copy_from_slice(&all[k][v.clone()]),
+                    Velocities::Generalized(all) => body.mul_l(cache, &all[k][v.clone()], &mut u[v.clone()]),
+                }
+            }
+        }
         let of_row = |(_, block): (usize, &Block)| {
-            let mean = 0.5 * (work.rows.row_velocity(block, 0, impulses.u[0]) + work.rows.row_velocity(block, 0, impulses.u[1]));
+            let mean = 0.5 * (work.rows.row_velocity(block, 0, &before) + work.rows.row_velocity(block, 0, &after));
             impulses.scale * work.lambda[block.row as usize] * mean
         };
         let mut done: f64 = rows().map(of_row).sum();
@@ -107,8 +124,8 @@ pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[G
             force.clear();
             force.resize(v.len(), 0.0);
             body.mul_l(&mut acting.derived.caches[entry.place], &moved[v.clone()], &mut force);
-            let along: f64 = force.iter().zip(&impulses.du_force[v]).map(|(a, b)| a * b).sum();
-            done += is - was - along / h;
+            let along: f64 = force.iter().zip(&impulses.du_force.0[v]).map(|(a, b)| a * b).sum();
+            done += is - was - along / impulses.du_force.1;
         }
         let joined_to_ground = rows().any(|(_, block)| block.sides().len() < 2);
         let rigid = if joined_to_ground { Some(Rigid::default()) } else { Rigid::of(objects(), &end.x) };

@@ -20,7 +20,7 @@ use crate::contact::time_of_impact::pose_after_free_motion;
 use crate::object::Level;
 use crate::object::part_state::PartState;
 use crate::step::contacts::{detect, lay_contacts_again, zero};
-use crate::step::correction::{self, Contacts, Impulses, Limits, Options};
+use crate::step::correction::{self, Contacts, Impulses, Limits, Options, Velocities};
 use crate::step::impact::{self, Candidate};
 use crate::step::{Moment, Workspace};
 use crate::world::{Core, StepError};
@@ -68,7 +68,12 @@ impl TimeStepping {
             work.frictionless.du.clear();
             let options = Options {
                 h,
-                impulses: (round == 0).then_some(Impulses { u, du_force, scale: 1.0, struck: &struck }),
+                impulses: (round == 0).then_some(Impulses {
+                    velocities: Velocities::Whitened(u),
+                    du_force: (du_force, h),
+                    scale: 1.0,
+                    struck: &struck,
+                }),
                 level: Level::Velocity { h },
                 start: &self.x0,
                 contacts: Contacts::Moved { mean },
