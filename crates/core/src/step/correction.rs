@@ -51,7 +51,6 @@ use crate::solver::SolverSettings;
 use crate::world::{Coordinates, Core, StepError};
 use errors::{Errors, Goal};
 use group::{Group, Round, by_start, entry_at};
-use joint_work::Before;
 
 pub(super) use errors::{ActiveLimit, Limits, limits_with_force};
 pub(super) use joint_work::{Impulses, Velocities};
@@ -175,6 +174,12 @@ fn correct_at(
     };
     let (arrived, mut moved) = (end.x.clone(), vec![0.0; core.dof]);
     let mut errors = Errors::new(core, work, probe, goal);
+    let mut workless = Vec::new();
+    if let Some((acting, impulses)) = acting.as_deref_mut().zip(options.impulses) {
+        let groups = Group::all(core, work, &errors, true);
+        let step = (impulses, &pushed[..], options.h);
+        workless = joint_work::advance(core, (end, acting), work, step, &groups, &mut moved);
+    }
     errors.measure(core, end)?;
     errors.activate(core);
     let mut groups = Vec::new();
@@ -186,9 +191,9 @@ fn correct_at(
             break;
         }
     }
-    if let Some((acting, impulses)) = acting.as_deref_mut().zip(options.impulses) {
-        let before = Before { impulses, work, acting, arrived: &arrived, moved: &moved, pushed: &pushed };
-        joint_work::balance(core, end, before, &groups);
+    if let Some((acting, impulses)) = acting.zip(options.impulses) {
+        let rows = (&*work, &*errors.probe, options.h);
+        joint_work::give_back(core, (end, acting), (&workless, &groups), (impulses, &moved), rows);
     }
     let open: Vec<&Group> = groups.iter().filter(|group| group.is_open(core)).collect();
     for group in open {

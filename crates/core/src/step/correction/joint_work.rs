@@ -1,46 +1,54 @@
 //! The work of joints in a step: none.
 //!
-//! Joints are workless, and the impulses of their rows act on the mean velocity of a step, which has a part
-//! along the rows: positions that are closed at both ends and velocities that are, too, do not fit a mean of
+//! Joints are workless, but the impulses of their rows act on the mean velocity of a step, which has a part
+//! along the rows: positions that are closed at both ends and velocities that are, too, do not fit the mean of
 //! two velocities,
 //!
 //! ```text
-//! x₁ − x₀ = ½h·(v₀ + v₁) − h³/12·x‴ + …           the correction moves bodies by the second term
+//! x₁ − x₀ = ½h·(v₀ + v₁) − (h³/12)·v″ + …             the correction moves bodies by the part of the second term along the rows
 //! ```
 //!
 //! So the impulses of the rows, and all forces along the correction, do work of the order `h³` per step. Over a cycle of a
-//! mechanism it adds up to zero; within one the energy is off by the order `h²`. For every group of joined objects
-//! this work is measured and returned to their motion:
+//! mechanism it adds up to zero; within one the energy is off by the order `h²`. Two things are therefore done
+//! for every group of joined objects. They move by the part of the second term along their velocity, which is known
+//! without `v″`: as joints are workless, `v·M·a = F·v` and `v·M·v″ = F·a − a·M·a`, with `h·(M·a − F) = Jᵀλ`. After the correction
+//! the work is returned to their motion:
 //!
 //! ```text
-//! W  = Σ λ·½(w₀ + w₁)  +  T(x₁, p₁) − T(x*, p*)  −  F·δ                         the sum over the rows of joints
-//! v₁ ← v_rigid + s·(v₁ − v_rigid),      ½(1 − s²)·|v₁ − v_rigid|² = W
+//! δ  = (h/12)·(Σ λ·(w₁ − w₀) / ½(|v₀|² + |v₁|²))·½(v₀ + v₁)                   then  g(x₁) = 0,  J₁v₁ = 0
+//! W  = Σ λ·½(w₀ + w₁)  +  T(x₁, p₁) − T(x*, p*)  −  F·(δ + correction)          sums over the rows of joints
+//! v₁ ← s·v₁,      ½(1 − s²)·|v₁|² = W
 //! ```
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | `λ`, `w₀`, `w₁` | multipliers of the step, velocities of rows before and after |
-//! | `x*`, `p*`; `x₁`, `p₁` | state before the correction, after it |
-//! | `F`, `δ` | forces, displacement by the correction |
-//! | `v_rigid` | 0 if the group is joined to the ground. Else the rigid motion that has its momenta, which stay as they are |
+//! | `x*`, `p*`; `x₁`, `p₁` | state before, after the correction |
+//! | `T`, `F` | kinetic energy, forces |
+//! | `v`, `|v|²` | velocity, twice its energy. In a group that nothing joins to the ground both are those relative to the rigid motion that has its momenta, which stay as they are |
 //!
 //! One factor for all velocities keeps joints closed in velocity. In a mechanism of one degree of freedom it is the only
-//! change of velocity that does, so its speed is exact wherever it is. A joint does work if a motor or a kinematic body
-//! drives it, if it closes (in position or velocity), and where something strikes: there nothing is returned.
+//! such change: its speed is exact wherever it is, and its time of higher order. In others the energy is exact, and the
+//! motion of second order.
+//!
+//! Groups with links of articulated bodies stay as they are: their free motion has errors of the same order.
+//! A joint does work if a motor or a kinematic body drives it, if it closes (in position or velocity), or where something
+//! strikes or pushes: there nothing is returned.
 
 use super::super::{Moment, Workspace};
 use super::group::{Group, by_start, entry_at};
 use super::is_joint;
 use crate::constraint::rows::Block;
 use crate::rigid::RigidBody;
-use crate::step::contacts::push;
+use crate::step::contacts::{push, shift, unwhiten_onto};
 use crate::world::Core;
 use crate::world::view::Entry;
+use std::ops::Range;
 use tumble_collide::{Mat3, Vec3};
 
 /// A joint with a larger velocity error at the start of a step closes in it, m/s or rad/s.
 const CLOSING: f64 = 1e-6;
-/// Most of the energy of motion that is taken at once: at the turn of a swing there is none.
+/// Largest share of the energy of motion that is returned at once: at the turn of a swing there is none.
 const MOST: f64 = 0.5;
 
 /// The impulses of a step.
@@ -56,37 +64,41 @@ pub(in super::super) struct Impulses<'a> {
     pub struck: &'a [bool],
 }
 
-/// Velocities of all objects at the time of an impulse.
+/// Velocities of all objects before and after the impulses.
 #[derive(Clone, Copy)]
 pub(in super::super) enum Velocities<'a> {
     Whitened([&'a [f64]; 2]),
     Generalized([&'a [f64]; 2]),
 }
 
-/// The step before its correction.
-pub(super) struct Before<'a> {
-    pub impulses: Impulses<'a>,
-    /// Rows of the step, and the moment at which they respond.
-    pub work: &'a Workspace,
-    pub acting: &'a mut Moment,
-    /// State before the correction, and generalized displacement by it.
-    pub arrived: &'a [f64],
-    pub moved: &'a [f64],
-    /// Per coordinate, whether a contact pushes in the island.
-    pub pushed: &'a [bool],
+/// A group whose joints do no work in the step.
+pub(super) struct Workless {
+    rows: Vec<u32>,
+    places: Vec<usize>,
+    to_ground: bool,
+    /// Work of the rows less the kinetic energy before the correction, J.
+    done: f64,
 }
 
-/// Returns the work of the joints of the groups to their motion, at the corrected moment `end`.
-pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[Group]) {
-    let Before { impulses, work, acting, arrived, moved, pushed } = before;
+/// Finds the workless groups of a step of `h` seconds, and moves them along their velocity. Adds the displacements to
+/// `moved`. `work` has the rows of the step, which respond at the moment `acting`; `pushed` tells where contacts push.
+pub(super) fn advance(
+    core: &Core,
+    (end, acting): (&mut Moment, &mut Moment),
+    work: &Workspace,
+    (impulses, pushed, h): (Impulses, &[bool], f64),
+    groups: &[Group],
+    moved: &mut [f64],
+) -> Vec<Workless> {
     let contacts = work.contact_constraints.len();
     let entries = by_start(core.objects());
-    let mut du = vec![0.0; core.dof];
+    let mut ways = vec![0.0; core.dof];
+    let [mut before, mut after] = [ways.clone(), ways.clone()];
     let tolerance = core.settings.contact_tolerance;
-    let (mut before, mut after) = (vec![0.0; core.dof], vec![0.0; core.dof]);
+    let mut found = Vec::new();
     for group in groups {
         let rows = || group.rows.iter().map(|&i| (i as usize, &work.rows.blocks[contacts + i as usize]));
-        let is_ideal = |(i, block): (usize, &Block)| {
+        let is_workless = |(i, block): (usize, &Block)| {
             let (target, row) = (&work.targets[i], block.row as usize);
             is_joint(target)
                 && block.compliance == 0.0
@@ -95,11 +107,15 @@ pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[G
                 && target.error.abs() <= tolerance
                 && work.closing.get(i).is_some_and(|v| v.abs() <= CLOSING)
         };
-        let free = |u: usize| !pushed[u] && !impulses.struck[u];
-        let objects = || group.ranges.iter().filter_map(|(_, v)| entry_at(&entries, v.start as u32));
-        if !group.closed() || !group.ranges.iter().all(|(_, v)| free(v.start)) || !rows().all(is_ideal) {
+        let ranges = || group.ranges.iter().map(|(_, v)| v.clone());
+        if !ranges().all(|v| !pushed[v.start] && !impulses.struck[v.start]) || !rows().all(is_workless) {
             continue;
         }
+        let objects = || ranges().filter_map(|v| entry_at(&entries, v.start as u32));
+        if objects().any(|entry| entry.object.integratable().is_none_or(|body| body.holds_velocity())) {
+            continue; // free motion of links has errors of the same order
+        }
+        let mut kinetic = 0.0;
         for entry in objects() {
             let Some(body) = entry.object.integratable() else { continue };
             let (v, cache) = (entry.state_range.v.clone(), &mut acting.derived.caches[entry.place]);
@@ -109,46 +125,75 @@ pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[G
                     Velocities::Generalized(all) => body.mul_l(cache, &all[k][v.clone()], &mut u[v.clone()]),
                 }
             }
+            kinetic += body.energy(&end.x[entry.state_range.x.clone()], &Vec3::zeros()).kinetic;
         }
-        let of_row = |(_, block): (usize, &Block)| {
-            let mean = 0.5 * (work.rows.row_velocity(block, 0, &before) + work.rows.row_velocity(block, 0, &after));
-            impulses.scale * work.lambda[block.row as usize] * mean
-        };
-        let mut done: f64 = rows().map(of_row).sum();
-        let (mut kinetic, mut force) = (0.0, Vec::new());
-        for entry in objects() {
-            let Some(body) = entry.object.integratable() else { continue };
-            let (x, v) = (entry.state_range.x.clone(), entry.state_range.v.clone());
-            let [was, is] = [arrived, &end.x].map(|at| body.energy(&at[x.clone()], &Vec3::zeros()).kinetic);
-            kinetic += is;
-            force.clear();
-            force.resize(v.len(), 0.0);
-            body.mul_l(&mut acting.derived.caches[entry.place], &moved[v.clone()], &mut force);
-            let along: f64 = force.iter().zip(&impulses.du_force.0[v]).map(|(a, b)| a * b).sum();
-            done += is - was - along / impulses.du_force.1;
+        let (mut done, mut turned) = (0.0, 0.0);
+        for (_, block) in rows() {
+            let [first, last] = [&before, &after].map(|u| work.rows.row_velocity(block, 0, u));
+            let impulse = impulses.scale * work.lambda[block.row as usize];
+            done += 0.5 * impulse * (first + last);
+            turned += impulse * (last - first);
         }
-        let joined_to_ground = rows().any(|(_, block)| block.sides().len() < 2);
-        let rigid = if joined_to_ground { Some(Rigid::default()) } else { Rigid::of(objects(), &end.x) };
-        let Some(rigid) = rigid else { continue };
-        let relative = kinetic - rigid.energy;
-        if done.abs() > MOST * relative {
+        let to_ground = rows().any(|(_, block)| block.sides().len() < 2);
+        if !to_ground && ![&mut before, &mut after].into_iter().all(|u| make_relative(objects(), acting, u)) {
             continue;
         }
-        let factor = (1.0 - done / relative).sqrt() - 1.0;
+        let of = |u: &[f64]| ranges().flatten().map(|i| u[i] * u[i]).sum::<f64>();
+        let squares = 0.5 * (of(&before) + of(&after));
+        if turned.abs() <= MOST * squares && squares > 0.0 {
+            let share = h / 12.0 * turned / squares;
+            ranges().flatten().for_each(|i| ways[i] = 0.5 * share * (before[i] + after[i]));
+        }
+        let places = objects().map(|entry| entry.place).collect();
+        found.push(Workless { rows: group.rows.clone(), places, to_ground, done: done - kinetic });
+    }
+    if ways.iter().any(|way| *way != 0.0) {
+        unwhiten_onto(acting.coordinates(core), &ways, moved);
+        shift(end.coordinates_by(core, &mut acting.derived.caches), &ways, 1.0);
+    }
+    found
+}
+
+/// Returns the work in a step of `h` seconds to the motion of the groups that are closed now, at the corrected moment `end`,
+/// whose rows are those of `corrected`.
+pub(super) fn give_back(
+    core: &Core,
+    (end, acting): (&mut Moment, &mut Moment),
+    (workless, groups): (&[Workless], &[Group]),
+    (impulses, moved): (Impulses, &[f64]),
+    (work, corrected, h): (&Workspace, &Workspace, f64),
+) {
+    let mut du = vec![0.0; core.dof];
+    let (mut whitened, mut relative) = (du.clone(), du.clone());
+    for found in workless {
+        if !groups.iter().any(|group| group.rows == found.rows && group.closed()) {
+            continue; // a limit takes part, or joints are open
+        }
+        let objects = || found.places.iter().map(|&place| core.objects().at(place));
+        // joints are closed to a tolerance: what their forces do along the rest is no error
+        let slack = |&i: &u32| {
+            let (i, row) = (i as usize, work.rows.blocks[work.contact_constraints.len() + i as usize].row);
+            work.lambda[row as usize] * (corrected.targets[i].error - work.targets[i].error)
+        };
+        let mut done = found.done - impulses.scale / h * found.rows.iter().map(slack).sum::<f64>();
+        let mut kinetic = 0.0;
         for entry in objects() {
             let Some(body) = entry.object.integratable() else { continue };
-            let v = entry.state_range.v.clone();
-            let (x, cache) = (&end.x[entry.state_range.x.clone()], &mut end.derived.caches[entry.place]);
-            let mut u = vec![0.0; v.len()];
-            if joined_to_ground {
-                body.whitened_velocity(cache, x, &mut u);
-            } else {
-                let mut relative = vec![0.0; v.len()];
-                body.velocity(x, &mut relative);
-                rigid.subtract(&Vec3::new(x[0], x[1], x[2]), &mut relative);
-                body.mul_l(cache, &relative, &mut u);
-            }
-            du[v].iter_mut().zip(&u).for_each(|(du, u)| *du = factor * u);
+            let (x, v): (&[f64], Range<usize>) = (&end.x[entry.state_range.x.clone()], entry.state_range.v.clone());
+            body.mul_l(&mut acting.derived.caches[entry.place], &moved[v.clone()], &mut whitened[v.clone()]);
+            let along: f64 = v.clone().map(|i| whitened[i] * impulses.du_force.0[i]).sum();
+            let energy = body.energy(x, &Vec3::zeros()).kinetic;
+            done += energy - along / impulses.du_force.1;
+            body.whitened_velocity(&mut end.derived.caches[entry.place], x, &mut relative[v.clone()]);
+        }
+        if !found.to_ground && !make_relative(objects(), end, &mut relative) {
+            continue;
+        }
+        let ranges = || objects().flat_map(|entry| entry.state_range.v.clone());
+        kinetic += ranges().map(|i| 0.5 * relative[i] * relative[i]).sum::<f64>();
+        if done != 0.0 && done.abs() <= MOST * kinetic {
+            let factor = (1.0 - done / kinetic).sqrt() - 1.0;
+            ranges().for_each(|i| du[i] = factor * relative[i]);
         }
     }
     if du.iter().any(|du| *du != 0.0) {
@@ -156,49 +201,44 @@ pub(super) fn balance(core: &Core, end: &mut Moment, before: Before, groups: &[G
     }
 }
 
-/// A rigid motion.
-#[derive(Default)]
-struct Rigid {
-    velocity: Vec3,
-    angular_velocity: Vec3,
-    center: Vec3,
-    /// J.
-    energy: f64,
+/// Subtracts from the whitened velocities of bodies the rigid motion that has their momenta. Returns false if other
+/// objects are among them, or bodies with locked axes.
+fn make_relative<'a>(objects: impl Iterator<Item = Entry<'a>> + Clone, at: &mut Moment, u: &mut [f64]) -> bool {
+    let (mut mass, mut moment, mut inertia) = (0.0, Vec3::zeros(), Mat3::zeros());
+    let (mut linear, mut angular) = (Vec3::zeros(), Vec3::zeros());
+    let mut bodies = Vec::new();
+    for entry in objects {
+        let any: &dyn std::any::Any = entry.object;
+        let (Some(body), Some(moves)) = (any.downcast_ref::<RigidBody>(), entry.object.integratable()) else {
+            return false;
+        };
+        let x = &at.x[entry.state_range.x.clone()];
+        let Some(own) = body.free_inertia(x) else { return false };
+        let (mut v, place) = ([0.0; 6], Vec3::new(x[0], x[1], x[2]));
+        moves.solve_l(&mut at.derived.caches[entry.place], &u[entry.state_range.v.clone()], &mut v);
+        let [turning, moving] = [Vec3::new(v[0], v[1], v[2]), body.mass() * Vec3::new(v[3], v[4], v[5])];
+        mass += body.mass();
+        moment += body.mass() * place;
+        inertia += own + body.mass() * about(&place);
+        linear += moving;
+        angular += own * turning + place.cross(&moving);
+        bodies.push((entry, place, v));
+    }
+    let center = moment / mass;
+    inertia -= mass * about(&center);
+    let Some(inverse) = inertia.try_inverse() else { return false };
+    let turning = inverse * (angular - center.cross(&linear));
+    for (entry, place, mut v) in bodies {
+        let moving = linear / mass + turning.cross(&(place - center));
+        (0..3).for_each(|k| (v[k], v[k + 3]) = (v[k] - turning[k], v[k + 3] - moving[k]));
+        if let Some(body) = entry.object.integratable() {
+            body.mul_l(&mut at.derived.caches[entry.place], &v, &mut u[entry.state_range.v.clone()]);
+        }
+    }
+    true
 }
 
-impl Rigid {
-    /// Returns the rigid motion that has the momenta of the bodies in a state; `None` if other objects are among them.
-    fn of<'a>(objects: impl Iterator<Item = Entry<'a>> + Clone, x: &[f64]) -> Option<Rigid> {
-        let (mut mass, mut moment) = (0.0, Vec3::zeros());
-        let (mut linear, mut angular) = (Vec3::zeros(), Vec3::zeros());
-        let mut inertia = Mat3::zeros();
-        for entry in objects {
-            let any: &dyn std::any::Any = entry.object;
-            let body = any.downcast_ref::<RigidBody>()?;
-            let x = &x[entry.state_range.x.clone()];
-            let (at, of_body) = (Vec3::new(x[0], x[1], x[2]), body.free_inertia(x)?);
-            let momentum = entry.object.integratable()?.momentum(x);
-            mass += body.mass();
-            moment += body.mass() * at;
-            inertia += of_body + body.mass() * (Mat3::from_diagonal_element(at.norm_squared()) - at * at.transpose());
-            linear += momentum.linear;
-            angular += momentum.angular;
-        }
-        let center = moment / mass;
-        inertia -= mass * (Mat3::from_diagonal_element(center.norm_squared()) - center * center.transpose());
-        angular -= center.cross(&linear);
-        let angular_velocity = inertia.try_inverse()? * angular;
-        let velocity = linear / mass;
-        let energy = 0.5 * (linear.dot(&velocity) + angular.dot(&angular_velocity));
-        Some(Rigid { velocity, angular_velocity, center, energy })
-    }
-
-    /// Subtracts its velocity at a point from that of a body there: angular, then linear.
-    fn subtract(&self, at: &Vec3, v: &mut [f64]) {
-        let linear = self.velocity + self.angular_velocity.cross(&(at - self.center));
-        for k in 0..3 {
-            v[k] -= self.angular_velocity[k];
-            v[k + 3] -= linear[k];
-        }
-    }
+/// Returns the inertia of a unit mass at a place about the origin, m².
+fn about(place: &Vec3) -> Mat3 {
+    Mat3::from_diagonal_element(place.norm_squared()) - place * place.transpose()
 }
