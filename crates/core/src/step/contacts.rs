@@ -418,8 +418,8 @@ pub(crate) fn displace(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| body.displace(cache, x, v, h));
 }
 
-/// Moves positions by `h·L⁻¹u` and keeps momenta: for joints. The change of energy is reversed in
-/// the next step.
+/// Moves positions by `h·L⁻¹u` and keeps momenta: for joints. The change of energy is returned
+/// (`correction/joint_work.rs`) or reversed in the next step.
 pub(crate) fn shift(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| {
         if body.holds_velocity() { body.displace(cache, x, v, h) } else { body.integrate_positions(x, v, h) }

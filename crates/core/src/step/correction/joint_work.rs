@@ -81,7 +81,7 @@ pub(super) struct Workless {
 }
 
 /// Finds the workless groups of a step of `h` seconds, and moves them along their velocity. Adds the displacements to
-/// `moved`. `work` has the rows of the step, which respond at the moment `acting`; `pushed` tells where contacts push.
+/// `moved`. `work` has the rows of the step, which respond at the moment `acting`; `pushed` states where contacts push.
 pub(super) fn advance(
     core: &Core,
     (end, acting): (&mut Moment, &mut Moment),
