@@ -90,7 +90,7 @@ fn whirl(stepper: &str, rate: f64) -> f64 {
             bar(&format!("bar {k}"), ends[0], ends[1]).with_angular_velocity(spin).with_velocity(spin.cross(&middle));
         let id = world.add(body).unwrap();
         let sides = (Some((id, 0)), last.map(|last| (last, 0)));
-        world.add(LoopJoint::spherical_at(&format!("joint {k}"), &world, sides.0, sides.1, ends[0]).unwrap()).unwrap();
+        world.add(LoopJoint::spherical_at(format!("joint {k}"), &world, sides.0, sides.1, ends[0]).unwrap()).unwrap();
         last = Some(id);
     }
     let start = world.energy().total();
