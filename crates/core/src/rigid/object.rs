@@ -50,6 +50,11 @@ impl RigidBody {
         r * self.inertia.tensor * r.transpose()
     }
 
+    /// Returns the inertia about the center of mass in a state, world axes, kg·m²; `None` if axes are locked.
+    pub(crate) fn free_inertia(&self, x: &[f64]) -> Option<Mat3> {
+        (self.locked == LockedAxes::default()).then(|| self.world_inertia(&orientation(x)))
+    }
+
     /// Returns the angular momentum of the state for an orientation and an angular velocity, world
     /// axes.
     fn angular_momentum(&self, q: &Quat, omega: &Vec3) -> Vec3 {

@@ -29,8 +29,10 @@
 
 use super::adhesion::adhere;
 use super::budget::IMPACTS;
-use super::contacts::{Limit, build_rows, detect, gyroscopic, impulses, limits, row_velocities, whiten};
-use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
+use super::contacts::{
+    Limit, build_rows, detect, free_motion_change, gyroscopic, impulses, limits, row_velocities, whiten,
+};
+use super::correction::{self, ActiveLimit, Contacts, Impulses, Limits, Options, Velocities};
 use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
 use super::held_forces::{hold_forces, push_to};
 use super::impact::{self, Candidate};
@@ -47,7 +49,7 @@ use crate::object::{Level, RowTarget};
 use crate::sensor::loads::SubstepForces;
 use crate::settings::{Integrator, Settings};
 use crate::solver::SolverSettings;
-use crate::world::{Core, StepError};
+use crate::world::{Coordinates, Core, StepError};
 use tumble_collide::NormalFrom;
 
 /// The stepper of the thesis, `backtracking`.
@@ -66,6 +68,8 @@ pub struct Backtracking {
     probe: Workspace,
     adaptive: Adaptive,
     fallback: TimeStepping,
+    /// Whitened forces at the start of the sub-step, without those of contacts and constraints.
+    forces: Vec<f64>,
 }
 
 /// The outcome of a solve for contact forces.
@@ -91,6 +95,22 @@ const CORRECTIONS: u32 = 2;
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
 fn is_soft(target: &RowTarget) -> bool {
     target.compliance > 0.0 && !target.inertial
+}
+
+/// Returns the generalized velocities `h` seconds of free motion after a state. Those of objects whose state holds
+/// velocities are those of the state.
+fn velocities_after(core: &mut Core, x: &[f64], h: f64) -> Vec<f64> {
+    let mut out = vec![0.0; core.dof];
+    let Coordinates { objects, caches, .. } = core.coordinates(None);
+    for entry in objects.iter().filter(|e| e.moves()) {
+        let Some(body) = entry.object.integratable() else { continue };
+        let mut x = x[entry.state_range.x.clone()].to_vec();
+        if !body.holds_velocity() {
+            body.free_motion(&mut caches[entry.place], &mut x, h);
+        }
+        body.velocity(&x, &mut out[entry.state_range.v.clone()]);
+    }
+    out
 }
 
 impl Stepper for Backtracking {
@@ -177,6 +197,7 @@ impl Backtracking {
         if self.work.targets.iter().any(drifted) || self.work.contact_constraints.iter().any(|t| off(t.contact.gap)) {
             let options = Options {
                 h: left,
+                impulses: None,
                 level: self.level,
                 start: &[],
                 contacts: Contacts::InPlace,
@@ -299,6 +320,11 @@ impl Backtracking {
         let mut u = Vec::new();
         whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
         work.dp = dp;
+        if work.targets.iter().any(correction::is_joint) {
+            self.forces.clone_from(&work.du_force);
+            let free = free_motion_change(core.coordinates(None), 1.0);
+            self.forces.iter_mut().zip(&free).for_each(|(force, free)| *force -= free);
+        }
         let mut velocity = Vec::new();
         row_velocities(&core.threads, &work.rows, &work.bias, &u, &mut velocity);
         let acceleration: Vec<f64> =
@@ -469,8 +495,20 @@ impl Backtracking {
     /// Corrects joints, and limits that had a force, at the end of a sub-step of `h` seconds;
     /// `left` is the time until the end of the frame.
     fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
+        let joined = self.work.targets.iter().any(correction::is_joint);
+        let (mut before, mut after, struck) = (Vec::new(), Vec::new(), vec![false; core.dof]);
+        if joined {
+            let end = core.state.x.to_vec();
+            (before, after) = (velocities_after(core, start, 0.5 * h), velocities_after(core, &end, -0.5 * h));
+        }
         let options = Options {
             h,
+            impulses: joined.then_some(Impulses {
+                velocities: Velocities::Generalized([&before, &after]),
+                du_force: (&self.forces, 1.0),
+                scale: h,
+                struck: &struck,
+            }),
             level: self.level,
             start,
             contacts: Contacts::Ignored,

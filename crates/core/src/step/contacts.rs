@@ -43,6 +43,8 @@ pub(crate) struct Workspace {
     pub first: Vec<usize>,
     /// Serial of the object that has each constraint.
     pub owners: Vec<u32>,
+    /// Velocity of each constraint row at the present, less its target, m/s or rad/s; none without joints.
+    pub closing: Vec<f64>,
     /// Right-hand side of a solve.
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
@@ -262,6 +264,7 @@ fn adopt(mut basis: Basis, work: &mut Workspace, made: Workspace) {
     }
     work.bias.extend(made.bias);
     (work.targets, work.kinds, work.first, work.owners) = (made.targets, made.kinds, made.first, made.owners);
+    work.closing = made.closing;
     make_room(work);
 }
 
@@ -279,6 +282,7 @@ pub(crate) fn lay_contacts_again(core: &mut Core, acting: &mut Moment, work: &mu
         kinds: std::mem::take(&mut work.kinds),
         first: std::mem::take(&mut work.first),
         owners: std::mem::take(&mut work.owners),
+        closing: std::mem::take(&mut work.closing),
         ..Workspace::default()
     };
     let time = core.state.time;
@@ -416,8 +420,8 @@ pub(crate) fn displace(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| body.displace(cache, x, v, h));
 }
 
-/// Moves positions by `h·L⁻¹u` and keeps momenta: for joints. The change of energy is reversed in
-/// the next step.
+/// Moves positions by `h·L⁻¹u` and keeps momenta: for joints. The change of energy is returned
+/// (`correction/joint_work.rs`) or reversed in the next step.
 pub(crate) fn shift(at: Coordinates, u: &[f64], h: f64) {
     each_displaced(at, u, |body, cache, x, v| {
         if body.holds_velocity() { body.displace(cache, x, v, h) } else { body.integrate_positions(x, v, h) }

@@ -37,10 +37,11 @@
 
 mod errors;
 mod group;
+mod joint_work;
 mod overlap;
 
 use super::budget::shared;
-use super::contacts::{Limit, lay_rows, limits, push, shift, unwhiten_onto, zero};
+use super::contacts::{Limit, lay_rows, limits, push, row_velocities, shift, unwhiten_onto, whiten, zero};
 use super::islands::each_island;
 use super::{Moment, Workspace, unreachable_joints};
 use crate::constraint::builder::constraints;
@@ -53,6 +54,7 @@ use errors::{Errors, Goal};
 use group::{Group, Round, by_start, entry_at};
 
 pub(super) use errors::{ActiveLimit, Limits, limits_with_force};
+pub(super) use joint_work::{Impulses, Velocities};
 pub(crate) use overlap::Frictionless;
 
 /// Number of sweeps per round in a group that is too large for a direct solve.
@@ -78,6 +80,8 @@ pub(super) enum Contacts<'a> {
 pub(super) struct Options<'a> {
     /// Length of the step whose end is corrected, s.
     pub h: f64,
+    /// Its impulses, if joints are to do no work in it.
+    pub impulses: Option<Impulses<'a>>,
     /// Level of the rows.
     pub level: Level,
     /// State at the start of the step.
@@ -175,6 +179,12 @@ fn correct_at(
     };
     let (arrived, mut moved) = (end.x.clone(), vec![0.0; core.dof]);
     let mut errors = Errors::new(core, work, probe, goal);
+    let mut workless = Vec::new();
+    if let Some((acting, impulses)) = acting.as_deref_mut().zip(options.impulses) {
+        let groups = Group::all(core, work, &errors, true);
+        let step = (impulses, &pushed[..], options.h);
+        workless = joint_work::advance(core, (end, acting), work, step, &groups, &mut moved);
+    }
     errors.measure(core, end)?;
     errors.activate(core);
     let mut groups = Vec::new();
@@ -185,6 +195,10 @@ fn correct_at(
         if !errors.activate(core) {
             break;
         }
+    }
+    if let Some((acting, impulses)) = acting.zip(options.impulses) {
+        let rows = (&*work, &*errors.probe, options.h);
+        joint_work::give_back(core, (end, acting), (&workless, &groups), (impulses, &moved), rows);
     }
     let open: Vec<&Group> = groups.iter().filter(|group| group.is_open(core)).collect();
     for group in open {
@@ -340,6 +354,7 @@ pub(super) fn middle(
     let (start, time) = (core.state.time, core.state.time + ahead);
     lay_rows(core.basis(None, start, None), &mut layout, level)?;
     let present: Vec<f64> = layout.targets.iter().map(|t| t.error).collect();
+    let closing = present_velocities(core, &layout);
     let mut at = core.moment();
     advance(core, &mut at, ahead);
     // open joints aim half-way closer: this shows whether they are unreachable
@@ -360,7 +375,17 @@ pub(super) fn middle(
     core.moments.push(at);
     map_sides(core.coordinates(acting), &mut rows, |body, cache, j, y| body.solve_lt(cache, j, y));
     unreachable_joints::soften(&mut rows, &far, unreachable_joints::GIVING);
+    rows.closing = closing;
     Ok((present, rows))
+}
+
+/// Returns the velocities of the rows of constraints at the present, less their targets.
+fn present_velocities(core: &mut Core, layout: &Workspace) -> Vec<f64> {
+    let (mut u, mut du, mut c) = (Vec::new(), Vec::new(), Vec::new());
+    let rest = vec![0.0; core.dof];
+    whiten(core.coordinates(None), &rest, 0.0, &mut u, &mut du);
+    row_velocities(&core.threads, &layout.rows, &layout.bias, &u, &mut c);
+    layout.rows.blocks.iter().zip(&layout.targets).map(|(block, t)| c[block.row as usize] - t.velocity).collect()
 }
 
 /// Advances a moment by `h` seconds of free motion.

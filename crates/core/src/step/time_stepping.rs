@@ -14,7 +14,8 @@
 //! With `t_i = h/2` the displacement is the mean of the old and the new velocity: second order on
 //! lasting contacts too (a box slides to its stop with the right deceleration). With an impact the
 //! two free motions and the term `(t_i − h/2)·h·a` add up to the parabola before and the parabola
-//! after.
+//! after. Forces of contacts that hold a body after an impact act in the mean of the rest of the step
+//! (`time_stepping/sustained.rs`).
 //!
 //! Impulses act where the body is at that time: mass matrix, rows and the velocity before the
 //! impulse are those of `x_½`, or of `x_0` after free motion of `t_i` if there is an impact. Free
@@ -37,6 +38,7 @@ mod impacts;
 mod lift;
 mod moving;
 mod passing;
+mod sustained;
 
 use super::adhesion::adhere;
 use super::contacts::{build_rows, detect, displace, impulses, push, shift, whiten};
@@ -102,6 +104,8 @@ struct Buffers {
     parts: Vec<Part>,
     /// Change of velocity by the rebound.
     late: Vec<f64>,
+    /// Change of velocity by what holds bodies after an impact.
+    sustained: Vec<f64>,
 }
 
 impl Stepper for TimeStepping {
@@ -285,7 +289,8 @@ impl TimeStepping {
             solve_patches(core, Some(middle), work, (settings, 1.0), keep, u)?;
         }
         keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
-        u.iter_mut().zip(&work.du).for_each(|(u, du)| *u += du);
+        self.find_sustained(core, settings, du_force);
+        u.iter_mut().zip(&self.work.du).for_each(|(u, du)| *u += du);
         Ok(())
     }
 
@@ -300,7 +305,7 @@ impl TimeStepping {
         du_force: &[f64],
     ) -> Result<(), StepError> {
         let impact_fraction = |i: usize| if self.impact_fraction[i] < 0.0 { 0.5 } else { self.impact_fraction[i] };
-        let Buffers { change, dp, parabola, rest, mean, late, end, .. } = &mut self.buffers;
+        let Buffers { change, dp, parabola, rest, mean, late, end, sustained, .. } = &mut self.buffers;
         let n = u0.len();
         write(change, n, |i| u1[i] - u0[i]);
         let before =
@@ -325,7 +330,9 @@ impl TimeStepping {
             own.v.iter_mut().for_each(|du| *du *= before(entry) - 1.0);
         });
         displace(core.coordinates(Some(&mut *middle)), late, h);
-        write(parabola, n, |i| (impact_fraction(i) - 0.5) * du_force[i]);
+        write(parabola, n, |i| {
+            (impact_fraction(i) - 0.5) * du_force[i] - 0.5 * (1.0 - impact_fraction(i)) * sustained[i]
+        });
         rest.clone_from(parabola);
         for i in core.objects().iter().filter(|e| in_the_middle(e)).flat_map(|e| e.state_range.v.clone()) {
             rest[i] -= (impact_fraction(i) - 0.5) * change[i];
@@ -334,7 +341,7 @@ impl TimeStepping {
         write(mean, n, |i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         rest.clone_from(mean);
         self.work.frictionless.du.clear();
-        self.correct(core, middle, h)?;
+        self.correct(core, middle, h, ([u0, u1], du_force))?;
         let Buffers { dp, total, keep, moved, rest: mean, end, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));

@@ -135,15 +135,12 @@ fn a_four_bar_linkage_stays_closed_for_a_minute_and_keeps_its_energy() {
         // joints are closed to 1e-9 m along each axis
         assert!(worst.gap < 3e-9, "{stepper}: pins are {:e} m apart", worst.gap);
         assert!(worst.off < 1e-6, "{stepper}: the coupler is {:e} m off the closed form", worst.off);
-        // of second order and without accumulation: less at the end of the minute than within a
-        // turn
         assert!(
-            worst.energy < 5e-3 * worst.kinetic,
+            worst.energy < 1e-6 * worst.kinetic,
             "{stepper}: energy is off by {:e} J of {} J",
             worst.energy,
             worst.kinetic
         );
-        assert!(worst.lost.abs() < 5e-4 * worst.kinetic, "{stepper}: {:e} J of {} J lost", worst.lost, worst.kinetic);
         assert!(worst.residual < 1e-9, "{stepper}: residual {:e} m/s", worst.residual);
     }
 }
@@ -243,9 +240,9 @@ fn a_kinematic_wheel_drives_the_piston() {
 
 #[test]
 fn steps_that_are_too_long_leave_the_linkage_closed() {
-    // the crank turns by up to 0.25 rad per frame: energy fluctuates unless frames are divided
+    // the crank turns by up to 0.25 rad per frame
     for stepper in STEPPERS {
-        for (max_turn, bound) in [(1e6, 0.5), (1.0, 0.03), (0.25, 2e-3)] {
+        for (max_turn, bound) in [(1e6, 1e-5), (1.0, 1e-6), (0.25, 1e-6)] {
             let mut bars = FourBar::new(stepper, 1.0 / 60.0);
             bars.world.set_settings(bars.world.settings().with_max_turn(max_turn)).unwrap();
             let worst = run(&mut bars, 60.0);

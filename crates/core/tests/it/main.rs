@@ -58,6 +58,7 @@ mod loop_joints_kinds;
 mod loop_joints_spatial;
 mod loop_joints_transmissions;
 mod loop_joints_turns;
+mod loop_joints_work;
 mod mesh_boxes;
 mod mesh_chains;
 mod mesh_frame;

@@ -48,13 +48,13 @@ macro_rules! table {
 
 table! {
     [1.0, 10.0];
-    billiards_time_stepping: "billiards", TimeStepping, "a324bc50eab8fdec", "5ba2a1c2fde17086";
+    billiards_time_stepping: "billiards", TimeStepping, "8f01ac981dbda08f", "35727a0afefe7dab";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "f6e9e6d3b6125c72";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "b642e6824b667564";
     bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "95d1a5d8a2efe886";
-    chain_time_stepping: "chain", TimeStepping, "6684822f2c0b1020", "f42518e923216b2d";
-    chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
-    falling_time_stepping: "falling", TimeStepping, "0068eeac1a1f03dd", "bb641edf06048f32";
+    chain_time_stepping: "chain", TimeStepping, "19383feae87ad78a", "ee4e088ef8917367";
+    chain_backtracking: "chain", Backtracking, "90d13d3b09555754", "51cdc3e8ded0b2fb";
+    falling_time_stepping: "falling", TimeStepping, "229ea17898f61b35", "f0dfabe735f7a2cc";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
     falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "3253ca0ba3cf7f3f";
@@ -75,7 +75,7 @@ table! {
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
-    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "15a93b0a058b423c";
+    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "31502da018d5f877";
     ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "50a39ed5ff84a6aa";
     bird_time_stepping: "bird", TimeStepping, "3d85f0ea42bb77db", "878264a194147426";
     bird_backtracking: "bird", Backtracking, "1ce1e6f8cf5eb25d", "dcde02ee42013d37";
@@ -85,17 +85,17 @@ table! {
     campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "e6aff00ba5a5b496";
+    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "5b143390393d7fa5";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
-    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "e41387b64750eaec";
+    newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "241aa3d8432a474e", "7156efd67d0d0401";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
-    steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
-    steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
-    arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "4c2e00f4dc0a531c";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "5a92b18e025f41b9";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "c74f1a6abf5b03bb";
-    mechanism_time_stepping: "mechanism", TimeStepping, "9495d2cfa387718e", "11f9bfbe21d904d0";
-    dominoes_time_stepping: "dominoes", TimeStepping, "ba5c12be5e184a78", "2866037ea3023084";
+    steam_engine_time_stepping: "steam_engine", TimeStepping, "3a2ab60873834ca6", "5c8c8e28cd5add5b";
+    steam_engine_backtracking: "steam_engine", Backtracking, "ce0a3badd81b48b4", "f65c1d0393337846";
+    arch_time_stepping: "arch", TimeStepping, "e7090b6cbe5ad156", "18bcba91421712a0";
+    walker_time_stepping: "walker", TimeStepping, "4f3cf3f418140f88", "3516c95fdc90d58f";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "999f55b2fdaf7618", "8f13492429d6ec9b";
+    mechanism_time_stepping: "mechanism", TimeStepping, "7e2d4f05a0a39919", "df85d4c9a9b121eb";
+    dominoes_time_stepping: "dominoes", TimeStepping, "5187ac861dfd8d3c", "2bad72fab1bc7bac";
 }
 
 table! {

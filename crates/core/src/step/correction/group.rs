@@ -178,6 +178,11 @@ impl Group {
         !self.joints.is_empty() && self.direct() && self.left.0 > tolerance / position_tolerance(tolerance)
     }
 
+    /// Returns whether its joints are closed, in position and velocity.
+    pub fn closed(&self) -> bool {
+        self.left.0 <= 1.0 && self.left.1 <= 1.0
+    }
+
     /// Gives its joint rows at the present state, in `probe`, the compliance `R` of a position
     /// error, m or rad.
     pub fn damp(&self, probe: &mut Workspace, error: f64) {

@@ -20,7 +20,7 @@ use crate::contact::time_of_impact::pose_after_free_motion;
 use crate::object::Level;
 use crate::object::part_state::PartState;
 use crate::step::contacts::{detect, lay_contacts_again, zero};
-use crate::step::correction::{self, Contacts, Limits, Options};
+use crate::step::correction::{self, Contacts, Impulses, Limits, Options, Velocities};
 use crate::step::impact::{self, Candidate};
 use crate::step::{Moment, Workspace};
 use crate::world::{Core, StepError};
@@ -45,7 +45,14 @@ struct Filed {
 impl TimeStepping {
     /// Corrects the positions at the end of a step of `h` seconds, first for the contacts of the step,
     /// then also for pairs of which others have deflected one into the other.
-    pub(super) fn correct(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
+    pub(super) fn correct(
+        &mut self,
+        core: &mut Core,
+        middle: &mut Moment,
+        h: f64,
+        (u, du_force): ([&[f64]; 2], &[f64]),
+    ) -> Result<(), StepError> {
+        let struck: Vec<bool> = self.impact_fraction.iter().map(|s| *s >= 0.0).collect();
         let mut moved = std::mem::take(&mut self.buffers.moved);
         moved.clear();
         for round in 0..=ROUNDS {
@@ -61,6 +68,12 @@ impl TimeStepping {
             work.frictionless.du.clear();
             let options = Options {
                 h,
+                impulses: (round == 0).then_some(Impulses {
+                    velocities: Velocities::Whitened(u),
+                    du_force: (du_force, h),
+                    scale: 1.0,
+                    struck: &struck,
+                }),
                 level: Level::Velocity { h },
                 start: &self.x0,
                 contacts: Contacts::Moved { mean },
