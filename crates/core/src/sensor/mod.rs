@@ -200,7 +200,8 @@ impl Sensor {
         Ok(self)
     }
 
-    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none.
+    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none. Of a camera of any kind it is the
+    /// largest depth that it sees, m: what is farther is no hit.
     ///
     /// # Errors
     /// [`SensorError::Range`] for a number that is not above 0, [`SensorError::Kind`] for orientations.

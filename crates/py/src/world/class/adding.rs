@@ -287,7 +287,7 @@ impl World {
     /// on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
     /// position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
     /// against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
-    /// count. cutoff: largest absolute value of a reading.
+    /// count. cutoff: largest absolute value of a reading; of a camera of any kind the largest depth that it sees, m.
     ///
     /// deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
     /// of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
