@@ -528,6 +528,22 @@ class RigidBody:
         1 m. casts_shadow: by default of directional lights.
         """
     @property
+    def camera(self) -> dict[str, Any] | None:
+        """The camera that it carries, as a dict of the arguments of ``attach_camera``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @camera.setter
+    def camera(self, value: dict[str, Any] | None) -> None: ...
+    @property
+    def light(self) -> dict[str, Any] | None:
+        """The light that it carries, as a dict of the arguments of ``attach_light``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @light.setter
+    def light(self, value: dict[str, Any] | None) -> None: ...
+    @property
     def gravity_scale(self) -> float:
         """Factor of the world's gravity, 1 by default."""
     @gravity_scale.setter
@@ -1596,6 +1612,22 @@ class Link:
         shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
         1 m. casts_shadow: by default of directional lights.
         """
+    @property
+    def camera(self) -> dict[str, Any] | None:
+        """The camera that it carries, as a dict of the arguments of ``attach_camera``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @camera.setter
+    def camera(self, value: dict[str, Any] | None) -> None: ...
+    @property
+    def light(self) -> dict[str, Any] | None:
+        """The light that it carries, as a dict of the arguments of ``attach_light``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @light.setter
+    def light(self, value: dict[str, Any] | None) -> None: ...
 
 @final
 class Articulation:
@@ -3210,7 +3242,7 @@ class World:
         on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
         position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
         against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
-        count. cutoff: largest absolute value of a reading.
+        count. cutoff: largest absolute value of a reading; of a camera of any kind the largest depth that it sees, m.
 
         deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
         of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
