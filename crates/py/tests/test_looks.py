@@ -149,8 +149,8 @@ def test_cameras_and_lights_are_read_replaced_and_removed(tmp_path, kind):
     for wrong, said in [({"fov_deg": 180}, "fov_deg is 180"), ({"fov": 60}, "camera: unknown argument 'fov'; expected position, forward"), ({"near": "close"}, "camera: near: expected a number")]:
         with pytest.raises(tumble.InvalidValueError, match=said):
             body.camera = wrong
-    with pytest.raises(tumble.InvalidValueError, match="light: unknown argument 'colour'"):
-        body.light = {"colour": (1, 1, 1)}
+    with pytest.raises(tumble.InvalidValueError, match="light: unknown argument 'tint'"):
+        body.light = {"tint": (1, 1, 1)}
     assert body.camera["fov_deg"] == pytest.approx(75), "an error changes nothing"
     body.camera = body.light = None
     assert body.camera is None and body.light is None

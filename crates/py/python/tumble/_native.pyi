@@ -18,7 +18,7 @@ from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
-_BodyOrLink: TypeAlias = RigidBody | Articulation | str | tuple[Articulation | str, str]
+_BodyOrLink: TypeAlias = RigidBody | Articulation | Link | str | tuple[Articulation | str, str]
 _Object: TypeAlias = (
     RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
 )
@@ -2883,7 +2883,7 @@ class World:
 
         A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
         only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (handles, a
         name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
         with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
         """
@@ -2926,8 +2926,8 @@ class World:
         """
     def closest_points(
         self,
-        a: _Body | Shape,
-        b: _Body | None = None,
+        a: _BodyOrLink | Shape,
+        b: _BodyOrLink | None = None,
         *,
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
@@ -2936,10 +2936,10 @@ class World:
         ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
         as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
-        """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
-        if ``b`` is None. None if a body has no shape or is disabled.
+        """Returns the closest points of two bodies or links, or of a shape at a pose and a body or link, the nearest one
+        if ``b`` is None. None if one has no shape or is disabled. Two links may be of one articulation.
 
-        a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
+        a: a body or link (a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link)), or a shape; b: a body or link. position, orientation: of a shape. Fields: ``distance``, m, the
         negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
         for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
         the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// A type of one or several whole numbers.
 pub trait Whole: for<'a, 'py> FromPyObject<'a, 'py> {
-    /// What a number of this type may be.
+    /// The range of a number of this type, in words.
     const EXPECTED: &'static str;
 }
 
