@@ -26,11 +26,11 @@ pub struct Link {
 }
 
 impl Link {
-    pub(super) fn articulation(&self) -> &Py<Articulation> {
+    pub(crate) fn articulation(&self) -> &Py<Articulation> {
         &self.articulation
     }
 
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
