@@ -89,5 +89,5 @@ pub use world::view::{Mode, ObjectId, Status, WorldView};
 pub use world::{
     BodyDistance, BodyView, ContactPoint, Event, EventKind, Overlap, PickForce, PointDepth, QueryFilter, Ray,
     RayCastHit, Replica, ReplicaError, ShapeCastHit, ShapeOverlap, SnapshotError, StateMemory, StateMemoryHold,
-    StepError, WorkingMemory, World, WorldError, WorldState,
+    StepError, TouchingPair, WorkingMemory, World, WorldError, WorldState,
 };

@@ -141,7 +141,7 @@ max_velocity_rad_per_s = 50
     arm = world.joint("arm")
     assert (arm.cone, arm.damping, arm.max_velocity) == (np.radians(20), 0.1, 50)
     scene.write_text(text.replace("cone_deg = 20", "cone_deg = -20"))
-    with pytest.raises(tumble.SceneError, match="cone_deg.*at least 0"):
+    with pytest.raises(tumble.SceneError, match="cone_deg.*from 0 to 180"):
         tumble.World.load(scene)
 
 

@@ -103,6 +103,73 @@ def test_a_link_carries_a_camera_and_a_light(tmp_path):
         assert carried(copy) == lines
 
 
+@pytest.mark.parametrize("kind", ["body", "link", "fixed link"])
+def test_cameras_and_lights_are_read_replaced_and_removed(tmp_path, kind):
+    world = tumble.World()
+    builder = tumble.ArticulationBuilder("arm")
+    builder.add_link("upper", axis=(0, 1, 0), shape=tumble.Box((0.1, 0.1, 0.4)), mass=1, position=(0, 0, 1))
+    builder.add_link("hand", "upper", joint="fixed", shape=tumble.Sphere(0.05), mass=0.1, position=(0, 0, -0.3))
+    arm = world.add_articulation(builder)
+    # its center of mass is not the origin of its frame
+    cone = world.add_rigid("cone", tumble.Compound([(tumble.Sphere(0.1), (0, 0, 0.5))]), mass=1)
+
+    def carrier(world):
+        return {"body": world["cone"], "link": world["arm"].link("upper"), "fixed link": world["arm"].link("hand")}[kind]
+
+    body = carrier(world)
+    assert arm.exists and cone.exists and body.camera is None and body.light is None
+    body.attach_camera((0, 0, -0.1), (0, 0, -1), (1, 0, 0), fov_deg=60, near=0.1, far=20)
+    body.attach_light(position=(0.1, 0, 0.2), color=(1, 0.5, 0), intensity=3, radius=0.02)
+
+    def both(body):
+        camera, light = body.camera, body.light
+        return [np.concatenate([np.atleast_1d(np.asarray(v, float)) for k, v in each.items() if k != "kind"]) for each in (camera, light)]
+
+    camera, light = body.camera, body.light
+    assert set(camera) == {"position", "forward", "up", "fov_deg", "near", "far"} and light["kind"] == "point"
+    expected = [[0, 0, -0.1, 0, 0, -1, 1, 0, 0, 60, 0.1, 20], [0.1, 0, 0.2, 0.02, 1, 0.5, 0, 3, 0]]
+    for found, right in zip(both(body), expected):
+        assert found == pytest.approx(right, abs=1e-12)
+    if kind != "body":
+        other = world["arm"].link({"link": "hand", "fixed link": "upper"}[kind])
+        offset = {"link": 0.3, "fixed link": -0.3}[kind]
+        assert other.camera["position"] == pytest.approx((0, 0, -0.1 + offset)), "the same one in the frame of the other link"
+    # what is read can be set
+    body.camera, body.light = camera, light
+    for found, right in zip(both(body), expected):
+        assert found == pytest.approx(right, abs=1e-12)
+    body.camera = {**camera, "fov_deg": 75}
+    body.light = {"kind": "directional", "direction": (0, 0, -1)}
+    assert body.light["casts_shadow"] is True and "position" not in body.light
+    world.save_scene(tmp_path / "saved.toml")
+    text = (tmp_path / "saved.toml").read_text()
+    assert text.count("vertical_fov_deg = ") == 1 and "vertical_fov_deg = 75.0" in text and 'type = "directional"' in text
+    for copy in (tumble.World.load(tmp_path / "saved.toml"), world.fork(), pickle.loads(pickle.dumps(world))):
+        assert carrier(copy).camera["fov_deg"] == pytest.approx(75) and carrier(copy).light["direction"] == pytest.approx((0, 0, -1))
+    for wrong, said in [({"fov_deg": 180}, "fov_deg is 180"), ({"fov": 60}, "camera: unknown argument 'fov'; expected position, forward"), ({"near": "close"}, "camera: near: expected a number")]:
+        with pytest.raises(tumble.InvalidValueError, match=said):
+            body.camera = wrong
+    with pytest.raises(tumble.InvalidValueError, match="light: unknown argument 'tint'"):
+        body.light = {"tint": (1, 1, 1)}
+    assert body.camera["fov_deg"] == pytest.approx(75), "an error changes nothing"
+    body.camera = body.light = None
+    assert body.camera is None and body.light is None
+    world.save_scene(tmp_path / "saved.toml")
+    text = (tmp_path / "saved.toml").read_text()
+    assert "camera = " not in text and "light = " not in text
+    body.attach_camera()
+    body.attach_light()
+
+
+def test_a_camera_sees_up_to_its_cutoff():
+    world = tumble.World()
+    world.add_static("near", tumble.Sphere(0.5), position=(0, 0, 3))
+    world.add_static("far", tumble.Box((50, 50, 1)), position=(0, 0, 10))
+    for kind, nothing in (("color", 0), ("depth", -1), ("segmentation", -1)):
+        seen = [world.add_sensor(kind, None, resolution=(8, 8), cutoff=cutoff).value for cutoff in (None, 5.0)]
+        assert not (seen[0] == nothing).any() and (seen[1] == nothing).any() and not (seen[1][4, 4] == nothing).all(), kind
+
+
 def test_a_light_and_a_glow_are_seen():
     world = tumble.World()
     world.add_static("wall", tumble.Box((2, 0.1, 2)), position=(0, 1, 0), appearance=tumble.Appearance(color=(1, 1, 1)))
@@ -129,7 +196,9 @@ def test_a_light_and_a_glow_are_seen():
         ({"pattern": "dots"}, "appearance.pattern is 'dots'; expected one of plain, checker"),
         ({"pattern_scale": 0.0}, "appearance.pattern_scale is 0; expected a length above 0"),
         ({"detail": "low"}, "appearance.detail is 'low'; expected full, simplified"),
-        ({"texture": "none.png"}, "appearance.texture: there is no file none.png"),
+        ({"texture": "none.png"}, "appearance.texture is none.png: there is no such file; expected a PNG file"),
+        ({"texture": __file__}, "test_looks.py: the texture is no PNG: .*; expected a PNG file"),
+        ({"detail": "sphere_tree=99"}, "appearance.detail is 'sphere_tree=99'; expected full, .*sphere_tree=LEVEL, LEVEL from 0 to 63"),
         ({"clearcoat": np.nan}, "appearance.clearcoat is NaN"),
     ],
 )

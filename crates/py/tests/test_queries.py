@@ -146,3 +146,28 @@ def test_contacts_name_the_part_of_a_compound():
     world.step(10)
     assert sorted(world.contacts["shapes"].tolist()) == [[0, 1], [0, 2], [0, 3], [0, 4]]
     assert (world.fork().contacts["shapes"] == world.contacts["shapes"]).all()
+
+
+def test_closest_points_take_links():
+    builder = tumble.ArticulationBuilder("arm")
+    builder.add_link("upper", axis=(0, 1, 0), shape=tumble.Sphere(0.5), mass=1)
+    builder.add_link("lower", "upper", axis=(0, 1, 0), position=(3, 0, 0), shape=tumble.Sphere(0.5), mass=1)
+    builder.add_link("hand", "lower", joint="fixed", position=(2, 0, 0), shape=tumble.Sphere(0.25), mass=1)
+    world = tumble.World()
+    arm = world.add_articulation(builder)
+    ball = world.add_rigid("ball", tumble.Sphere(0.5), mass=1, position=(0, 0, 4))
+    for upper in (arm.link("upper"), "arm/upper", (arm, "upper")):
+        for hand in (arm.link("hand"), "arm/hand", (arm, "hand")):
+            pair = world.closest_points(upper, hand)
+            assert pair["distance"] == pytest.approx(4.25) and pair["points"].round(9).tolist() == [[0.5, 0, 0], [4.75, 0, 0]]
+    assert world.closest_points("arm/lower", ball)["distance"] == pytest.approx(4.0)
+    assert world.closest_points(ball, arm)["distance"] == pytest.approx(3.0)
+    # a shape and a link: not the nearer links
+    probe = tumble.Sphere(0.1)
+    assert world.closest_points(probe, arm.link("hand"), position=(0, 0, 2))["distance"] == pytest.approx(29**0.5 - 0.35)
+    assert world.closest_points(probe, arm, position=(0, 0, 2))["distance"] == pytest.approx(1.4)
+    assert [row["body"] for row in world.overlaps(tumble.Sphere(1), ignore=arm.link("upper"))] == []
+    hit = world.cast_shape(probe, (1, 0, 0), 10, (-2, 0, 0), ignore=[arm.link("upper"), arm.link("lower")])
+    assert hit["distance"] == pytest.approx(6.65) and arm.link_names[hit["part"]] == "lower", "the hand moves with the lower link"
+    with pytest.raises((tumble.UnknownNameError, tumble.InvalidValueError), match="foot"):
+        world.closest_points("arm/foot", ball)

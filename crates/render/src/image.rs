@@ -4,7 +4,7 @@ use crate::RenderError;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
-use tumble_scene::open_file;
+use tumble_scene::{MAX_TEXTURE_SIDE, open_file};
 
 /// A picture: 8-bit sRGB with alpha, rows from the top, four bytes `r, g, b, a` per pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,8 +98,9 @@ impl Image {
         decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
         let mut reader = decoder.read_info().map_err(|e| fail(format!("the texture is no PNG: {e}")))?;
         let (width, height) = (reader.info().width, reader.info().height);
-        if width > 8192 || height > 8192 {
-            return Err(fail(format!("the texture is {width} x {height} pixels, and each side may have 8192")));
+        if width.max(height) > MAX_TEXTURE_SIDE {
+            let most = MAX_TEXTURE_SIDE;
+            return Err(fail(format!("the texture is {width} x {height} pixels, and each side may have {most}")));
         }
         let size = reader.output_buffer_size().ok_or_else(|| fail("the texture is too large".into()))?;
         let mut bytes = vec![0; size];

@@ -75,6 +75,7 @@ pub use build::grid::{ValueGrid, read_grid};
 pub use build::heights::{HeightGrid, read_heights};
 pub use build::mesh_files::{read_mesh_bytes, read_solid, read_triangles};
 pub use build::slow::{building_surface, set_slow_load_listener};
+pub use build::textures::{MAX_TEXTURE_SIDE, check_texture};
 pub use error::SceneError;
 pub use notes::{Notes, overlap_notes, visual_notes};
 pub use open::LoadOptions;

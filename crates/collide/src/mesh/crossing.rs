@@ -152,12 +152,12 @@ fn flat_segment_meets([p, q]: [&Vec3; 2], [a, b, c]: [&Vec3; 3]) -> bool {
 /// The two coordinates of the projections along each axis.
 const PLANES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
-fn orient2d([k, l]: [usize; 2], a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {
+pub(super) fn orient2d([k, l]: [usize; 2], a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {
     let at = |p: &Vec3| Coord { x: p[k], y: p[l] };
     robust::orient2d(at(a), at(b), at(c))
 }
 
-fn orient3d(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
+pub(super) fn orient3d(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
     let at = |p: &Vec3| Coord3D { x: p.x, y: p.y, z: p.z };
     robust::orient3d(at(a), at(b), at(c), at(d))
 }

@@ -34,6 +34,8 @@ const MAX_CUT: usize = 4;
 const MIN_CUT: usize = 200_000;
 /// Largest distance of coincident faces, as a fraction of the diagonal.
 const SAME_PLACE: f64 = 1e-10;
+/// Least cosine between a ray and the normal of the piece at which it starts.
+const STEEP: f64 = 0.1;
 /// Largest difference of a reliable winding number from an integer.
 const MAX_ROUNDING: f64 = 0.2;
 
@@ -219,12 +221,25 @@ fn classify(
             jump += normal.dot(&facing).signum();
         }
     }
-    let middle = winding.excluding(&center, &through);
+    let middle = middle_winding(winding, &center, &through, &normal, jump);
     let (front, back) = (middle - 0.5 * jump, middle + 0.5 * jump);
     if (front - front.round()).abs() > MAX_ROUNDING || normal.norm() == 0.0 {
         return PieceClass::Doubtful;
     }
     if (front > 0.5) == (back > 0.5) { PieceClass::Buried } else { PieceClass::Bounds(1.0 / jump) }
+}
+
+/// Returns the mean of the winding numbers in front of a piece and behind it: what a ray counts that leaves it to one side, which is the number on
+/// that side. Axes that are nearly in its plane are left out; without a ray that meets no edge it is the sum of solid angles.
+fn middle_winding(winding: &WindingNumber, center: &Vec3, through: &[u32], normal: &Vec3, jump: f64) -> f64 {
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|a, b| normal[*b].abs().total_cmp(&normal[*a].abs()));
+    let steep = axes.into_iter().filter(|&axis| normal[axis].abs() > STEEP * normal.norm());
+    let counted = steep.into_iter().find_map(|axis| {
+        let count = f64::from(winding.count(center, through, axis)?);
+        Some(count + 0.5 * jump * normal[axis].signum())
+    });
+    counted.unwrap_or_else(|| winding.excluding(center, through))
 }
 
 /// Cuts a face along the planes of others, and along the edges of coplanar others. Returns `None`

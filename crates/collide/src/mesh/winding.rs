@@ -15,11 +15,16 @@
 //! | `N = Σ A n` | sum of area vectors of the group |
 //! | `D = Σ A (c − p) nᵀ` | their first moment, `c` a triangle's centroid |
 //!
+//! The winding number of a closed surface is also the number of times by which a ray leaves it more than it enters. [`WindingNumber::count`] finds
+//! that with exact predicates along an axis, in far less time where many triangles are near; if the ray meets an edge, or `q` lies on a
+//! triangle, along another axis, and otherwise by the sum.
+//!
 //! Sources: Van Oosterom and Strackee, *The solid angle of a plane triangle* (1983); Barill et al.,
 //! *Fast winding numbers for soups and clouds* (2018), of which the first two terms are used.
 
 use super::TriMesh;
 use super::aabb_tree::AabbTree;
+use super::crossing::{orient2d, orient3d};
 use crate::{Mat3, Vec3};
 use nalgebra::RealField;
 use std::f64::consts::PI;
@@ -82,7 +87,34 @@ impl WindingNumber {
 
     /// Returns whether `p` is inside the solid that the surface encloses at least once.
     pub fn contains(&self, p: &Vec3) -> bool {
-        self.checked_sum(p, &[], solid_angle_off_plane) > 0.5
+        let count = (0..3).find_map(|axis| self.count(p, &[], axis));
+        count.map_or_else(|| self.checked_sum(p, &[], solid_angle_off_plane) > 0.5, |count| count > 0)
+    }
+
+    /// Returns how often a ray from `p` along an axis leaves the surface more than it enters, without some triangles. For a closed surface and
+    /// none skipped it is the winding number. `None` if the ray meets the edge of a triangle, or `p` lies on one.
+    pub(super) fn count(&self, p: &Vec3, skipped: &[u32], axis: usize) -> Option<i32> {
+        let plane = [(axis + 1) % 3, (axis + 2) % 3];
+        let (mut count, mut open, mut depth) = (0, [0_u32; 64], 1);
+        while depth > 0 {
+            depth -= 1;
+            let n = open[depth] as usize;
+            let node = &self.tree.nodes[n];
+            let bounds = &node.bounds;
+            if p[axis] > bounds.max[axis] || plane.iter().any(|&k| p[k] < bounds.min[k] || p[k] > bounds.max[k]) {
+                continue;
+            }
+            if node.count == 0 {
+                open[depth] = node.second;
+                open[depth + 1] = n as u32 + 1;
+                depth += 2;
+                continue;
+            }
+            for k in node.range().filter(|&k| !skipped.contains(&self.tree.ids[k])) {
+                count += leaves(p, &self.corners[k], plane, axis)?;
+            }
+        }
+        Some(count)
     }
 
     /// Returns the winding number without some triangles that contain `p`.
@@ -143,6 +175,36 @@ impl Group {
     fn angle(&self, r: &Vec3, square: f64) -> f64 {
         let cube = square * square.sqrt();
         (self.area.dot(r) + self.moment.trace() - 3.0 * r.dot(&(self.moment * r)) / square) / cube
+    }
+}
+
+/// Returns 1 if a ray from `p` along an axis passes a triangle from behind, −1 from its front, 0 if it does not; `None` if it meets an edge or `p`
+/// lies on the triangle.
+fn leaves(p: &Vec3, corners: &[Vec3; 3], plane: [usize; 2], axis: usize) -> Option<i32> {
+    let [a, b, c] = corners;
+    // beside or behind, without a predicate
+    let beside = |k: usize| {
+        let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+        p[k] < low || p[k] > high
+    };
+    if plane.iter().any(|&k| beside(k)) || p[axis] > a[axis].max(b[axis]).max(c[axis]) {
+        return Some(0);
+    }
+    let sides = [orient2d(plane, a, b, p), orient2d(plane, b, c, p), orient2d(plane, c, a, p)];
+    if sides.iter().any(|s| *s > 0.0) && sides.iter().any(|s| *s < 0.0) {
+        return Some(0);
+    }
+    let turn = if sides.iter().all(|s| *s > 0.0) {
+        1
+    } else if sides.iter().all(|s| *s < 0.0) {
+        -1
+    } else {
+        return None;
+    };
+    // positive below the plane, seen from where the corners turn counter-clockwise
+    match orient3d(a, b, c, p) {
+        0.0 => None,
+        below => Some(if (below > 0.0) == (turn > 0) { turn } else { 0 }),
     }
 }
 

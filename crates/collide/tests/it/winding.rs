@@ -322,3 +322,36 @@ fn crossing_public_meshes_have_the_sign_of_their_union() {
         }
     }
 }
+
+/// The side of a point in a soup that crosses itself is that of the sum of all solid angles, also of points that lie above vertices and edges
+/// along the axes of the rays that decide it.
+#[test]
+fn rays_and_solid_angles_agree_on_what_a_soup_contains() {
+    let mut rng = Rng::new(77);
+    let (mut inside, mut above) = (0, 0);
+    for _ in 0..3 {
+        let vertices: Vec<Vec3> =
+            (0..90).map(|_| Vec3::from(std::array::from_fn(|_| rng.between(-1.0, 1.0)))).collect();
+        let triangles = (0..30).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let solid = TriMesh { vertices, triangles }.thickened(Some(0.1), false).unwrap();
+        let winding = WindingNumber::new(&solid);
+        for n in 0..3000 {
+            let mut p = Vec3::from(std::array::from_fn(|_| rng.between(-1.0, 1.0)));
+            // on the lines through a vertex along one axis, two of them, or all
+            let corner = solid.vertices[n % solid.vertices.len()];
+            match n % 4 {
+                1 => p = Vec3::new(p.x, corner.y, corner.z),
+                2 => p = Vec3::new(corner.x, corner.y, p.z),
+                3 => p.x = corner.x,
+                _ => {}
+            }
+            let sum = winding.exact(&p);
+            if (sum - sum.round()).abs() < 1e-6 {
+                assert_eq!(winding.contains(&p), sum > 0.5, "{p:?}: {sum}");
+                inside += usize::from(sum > 0.5);
+                above += usize::from(n % 4 != 0);
+            }
+        }
+    }
+    assert!(inside > 300 && above > 5000, "{inside} {above}");
+}

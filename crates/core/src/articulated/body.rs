@@ -280,6 +280,36 @@ impl ArticulatedBody {
         Ok(())
     }
 
+    /// Replaces the cameras of a link, and of the links fixed to it, by others with poses in the link's frame; none removes them.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
+    pub fn set_cameras(
+        &mut self,
+        link: &str,
+        cameras: impl IntoIterator<Item = CameraMount>,
+    ) -> Result<(), ArticulatedError> {
+        let (part, frame) = self.part_of(link, &Pose::identity())?;
+        self.cameras.retain(|camera| camera.part != part);
+        self.cameras.extend(cameras.into_iter().map(|mount| CameraMount { part, pose: frame * mount.pose, ..mount }));
+        Ok(())
+    }
+
+    /// Replaces the lights of a link, and of the links fixed to it, by others with poses in the link's frame; none removes them.
+    ///
+    /// # Errors
+    /// [`ArticulatedError::NoLink`].
+    pub fn set_lights(
+        &mut self,
+        link: &str,
+        lights: impl IntoIterator<Item = LightMount>,
+    ) -> Result<(), ArticulatedError> {
+        let (part, frame) = self.part_of(link, &Pose::identity())?;
+        self.lights.retain(|light| light.part != part);
+        self.lights.extend(lights.into_iter().map(|mount| LightMount { part, pose: frame * mount.pose, ..mount }));
+        Ok(())
+    }
+
     /// Adds a light to a link. Its pose is in the link's frame; its `part` is set here.
     ///
     /// # Errors

@@ -207,7 +207,7 @@ impl LinkBuilder {
         self
     }
 
-    /// Sets the largest swing of its spherical joint, rad: the half angle of a cone about axis 0, 1 or 2 (x, y or z) of the
+    /// Sets the largest swing of its spherical joint, rad, 0 to π: the half angle of a cone about axis 0, 1 or 2 (x, y or z) of the
     /// joint's frame, in which the same axis of the link stays.
     pub fn with_cone(mut self, axis: usize, angle: f64) -> Self {
         self.cone = Some((axis, angle));

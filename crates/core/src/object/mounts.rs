@@ -80,12 +80,15 @@ pub enum Detail {
     Full,
     /// Fewer triangles, one color and no pattern.
     Simplified,
-    /// The spheres of this level of its sphere tree, with 0 the root. Shapes without a tree are
-    /// drawn in full.
+    /// The spheres of this level of its sphere tree, with 0 the root, and the leaves above it. Shapes without a tree are drawn in full.
+    /// Words have a level of 0 to 63, which is that of any tree.
     SphereTree(u32),
     /// Its edges.
     Wireframe,
 }
+
+/// Largest number of levels of a sphere tree.
+const TREE_LEVELS: u32 = 64;
 
 impl Detail {
     /// Returns its name: `full`, `simplified`, `wireframe`, `sphere_tree=LEVEL`.
@@ -108,8 +111,11 @@ impl std::str::FromStr for Detail {
             "simplified" => Ok(Detail::Simplified),
             "wireframe" => Ok(Detail::Wireframe),
             _ => {
-                let level = words.strip_prefix("sphere_tree=").and_then(|n| n.parse().ok());
-                level.map(Detail::SphereTree).ok_or_else(|| "full, simplified, wireframe or sphere_tree=LEVEL".into())
+                let level =
+                    words.strip_prefix("sphere_tree=").and_then(|n| n.parse().ok()).filter(|n| *n < TREE_LEVELS);
+                level
+                    .map(Detail::SphereTree)
+                    .ok_or_else(|| "full, simplified, wireframe or sphere_tree=LEVEL, LEVEL from 0 to 63".into())
             }
         }
     }

@@ -399,12 +399,24 @@ impl RigidBody {
         self
     }
 
+    /// Replaces its cameras by others, whose poses are in the body's frame; none removes them.
+    pub fn set_cameras(&mut self, cameras: impl IntoIterator<Item = CameraMount>) {
+        let to_part = Translation3::from(-self.center);
+        self.cameras = cameras.into_iter().map(|mount| CameraMount { pose: to_part * mount.pose, ..mount }).collect();
+    }
+
     /// Adds a light; its pose is in the body's frame.
     #[must_use]
     pub fn with_light(mut self, mut light: LightMount) -> Self {
         light.pose = Translation3::from(-self.center) * light.pose;
         self.lights.push(light);
         self
+    }
+
+    /// Replaces its lights by others, whose poses are in the body's frame; none removes them.
+    pub fn set_lights(&mut self, lights: impl IntoIterator<Item = LightMount>) {
+        let to_part = Translation3::from(-self.center);
+        self.lights = lights.into_iter().map(|mount| LightMount { pose: to_part * mount.pose, ..mount }).collect();
     }
 
     /// Replaces cameras and lights by others whose poses are in the frame of the part.

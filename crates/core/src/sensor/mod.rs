@@ -176,6 +176,15 @@ impl Sensor {
         })
     }
 
+    /// Makes a sensor of a world that shows another one, for [`Replica::add_sensor`](crate::Replica::add_sensor): its readings come from
+    /// there, so its place may be one that this world does not have. `site` is where a camera looks from; without one it looks from the
+    /// origin of the world.
+    pub fn shown(name: impl Into<String>, kind: SensorKind, site: Option<Anchor>) -> Sensor {
+        let place = SensorPlace::Site(site.unwrap_or_else(|| Anchor::world(tumble_collide::Pose::identity())));
+        let (noise, optics) = (SensorNoise::default(), Optics::default());
+        Sensor { name: name.into(), kind, place, reference: None, volume: None, cutoff: f64::INFINITY, noise, optics }
+    }
+
     /// Sets the frame against which a position, an orientation or a velocity is read.
     ///
     /// # Errors
@@ -200,7 +209,8 @@ impl Sensor {
         Ok(self)
     }
 
-    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none.
+    /// Sets the largest absolute value of every number of a reading, in its unit; infinite for none. Of a camera of any kind it is the
+    /// largest depth that it sees, m: what is farther is no hit.
     ///
     /// # Errors
     /// [`SensorError::Range`] for a number that is not above 0, [`SensorError::Kind`] for orientations.

@@ -209,6 +209,8 @@ pub struct Core {
     pub(crate) broken: Vec<u32>,
     /// Events of the last frame.
     pub(crate) events: Vec<Event>,
+    /// Whether the pairs that touch are known: in a replica those that were sent.
+    pub(crate) knows_touching: bool,
     /// Cameras whose images of the frame are in the state, or whose bias walks.
     pub(crate) cameras: Vec<ObjectId>,
     pub(crate) report: StepReport,
@@ -276,6 +278,7 @@ impl Core {
             loads: FrameLoads::default(),
             broken: Vec::new(),
             events: Vec::new(),
+            knows_touching: true,
             cameras: Vec::new(),
             report: StepReport::default(),
             meter: WorkMeter::default(),
@@ -294,6 +297,7 @@ impl Core {
             pair_materials: self.pair_materials.clone(),
             contacts: self.contacts.clone(),
             events: self.events.clone(),
+            knows_touching: self.knows_touching,
             cameras: Vec::new(),
             report: self.report,
             ..Core::new(self.table.clone(), self.settings, self.solver.fork(), self.state.clone())

@@ -116,10 +116,24 @@ pub(crate) struct Touching {
 }
 
 impl Touching {
+    /// Returns the pair of these serials and parts.
+    pub fn of(pair: [u32; 4], sensor: bool) -> Touching {
+        Touching { sensor: u32::from(sensor), pair }
+    }
+
     /// Returns whether an object with this serial takes part.
     pub fn names(&self, serial: u32) -> bool {
         self.pair[0] == serial || self.pair[2] == serial
     }
+}
+
+/// Two parts that touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TouchingPair {
+    /// Object and part of either side; the sensor first.
+    pub sides: [(ObjectId, usize); 2],
+    /// Whether the first side, or a shape of it, is a sensor that the second one is in.
+    pub sensor: bool,
 }
 
 /// A contact of a sub-step.
@@ -185,8 +199,28 @@ impl World {
         &self.core.events
     }
 
+    /// Returns whether the pairs that touch are known. In a facet they are those that its server sends: with the events, if the run has
+    /// them, and otherwise not at all. Everywhere else they are always known.
+    pub fn knows_touching(&self) -> bool {
+        self.core.knows_touching
+    }
+
+    /// Returns the pairs of parts that touch after the last frame, each once: sensors last.
+    pub fn touching_pairs(&self) -> Vec<TouchingPair> {
+        let side = |serial, part: u32| Some((self.core.table.order[self.core.by_serial(serial)?], part as usize));
+        let pair = |touching: &Touching| {
+            let [a, part_a, b, part_b] = touching.pair;
+            Some(TouchingPair { sides: [side(a, part_a)?, side(b, part_b)?], sensor: touching.sensor > 0 })
+        };
+        let mut pairs: Vec<TouchingPair> = self.core.state.touching.iter().filter_map(pair).collect();
+        let place = |(id, part): (ObjectId, usize)| (self.core.table.place(id), part);
+        pairs.sort_by_key(|pair| (pair.sensor, pair.sides.map(place)));
+        pairs.dedup();
+        pairs
+    }
+
     /// Returns the objects and parts in contact with an object after the last frame, or in it if it
-    /// is a sensor; each once, in the order of addition.
+    /// is a sensor; each once, in the order of addition. Empty in a facet that does not [know](Self::knows_touching) them.
     pub fn touching(&self, id: ObjectId) -> Vec<(ObjectId, usize)> {
         let Some(serial) = self.core.table.place(id).map(|place| self.core.state.objects[place].serial) else {
             return Vec::new();

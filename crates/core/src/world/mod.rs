@@ -32,7 +32,7 @@ pub(crate) use self::core::Coordinates;
 pub use self::core::{ContactPoint, Core, StepError};
 pub use body_view::BodyView;
 pub use error::WorldError;
-pub use events::{Event, EventKind};
+pub use events::{Event, EventKind, TouchingPair};
 pub use pick::PickForce;
 pub use query::{BodyDistance, Overlap, PointDepth, QueryFilter, Ray, RayCastHit, ShapeCastHit, ShapeOverlap};
 pub use replica::{Replica, ReplicaError};

@@ -1,10 +1,11 @@
 //! A world that shows the simulation of another process (thesis §IV.A.6). Nothing here steps.
 
-use super::events::Event;
+use super::events::{Event, Touching, TouchingPair};
 use super::{ContactPoint, World, WorldError};
-use crate::object::SyncError;
 use crate::object::part_state::PartState;
-use crate::world::view::ObjectId;
+use crate::object::{Object, SyncError};
+use crate::sensor::Sensor;
+use crate::world::view::{Mode, ObjectId};
 use tumble_collide::Pose;
 
 /// The reason why an object refused a message. The world is unchanged.
@@ -101,5 +102,32 @@ impl Replica<'_> {
         let table = &core.table;
         let present = |e: &Event| table.place(e.a).is_some() && e.b.is_none_or(|b| table.place(b).is_some());
         core.events.extend(events.into_iter().filter(present));
+    }
+
+    /// Shows these pairs as those that touch; `None` if they are not known. Pairs of objects that are not in the world are left out.
+    pub fn set_touching(&mut self, pairs: Option<impl IntoIterator<Item = TouchingPair>>) {
+        let core = &mut self.0.core;
+        core.knows_touching = pairs.is_some();
+        core.state.touching.clear();
+        let serial = |id| core.table.place(id).map(|place| core.state.objects[place].serial);
+        let shown = |TouchingPair { sides: [(a, part_a), (b, part_b)], sensor }: TouchingPair| {
+            Some(Touching::of([serial(a)?, part_a as u32, serial(b)?, part_b as u32], sensor))
+        };
+        let mut touching: Vec<Touching> = pairs.into_iter().flatten().filter_map(shown).collect();
+        touching.sort_unstable();
+        touching.dedup();
+        core.state.touching = touching;
+    }
+
+    /// Adds a sensor whose readings come from elsewhere, so it reads nothing at its addition and need not fit this world.
+    ///
+    /// # Errors
+    /// [`WorldError`]: a name that is taken, or an object that was removed.
+    pub fn add_sensor(&mut self, sensor: Sensor) -> Result<ObjectId, WorldError> {
+        if sensor.place().object().is_some_and(|id| self.0.object(id).is_none()) {
+            return Err(WorldError::Stale);
+        }
+        let name = Object::name(&sensor).to_string();
+        self.0.add_named(name, Box::new(sensor), Mode::Dynamic)
     }
 }

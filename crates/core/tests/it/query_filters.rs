@@ -79,3 +79,27 @@ fn a_query_as_a_body_finds_what_it_collides_with() {
     world.remove(red).unwrap();
     assert_eq!(seen(&world, &as_red), [""; 0]);
 }
+
+#[test]
+fn closest_points_of_links_are_those_of_their_own_shapes() {
+    let (world, robot, [red, _]) = scene();
+    let body = world.get::<ArticulatedBody>(robot).unwrap();
+    let parts = |link: &str| body.parts_of_link(link).unwrap();
+    let between = |a: &str, b: &str| {
+        let (a, b) = (parts(a), parts(b));
+        world.closest_points_of((robot, Some(&a)), (robot, Some(&b))).unwrap().unwrap()
+    };
+    // cubes of 0.4 m, 1 m apart; a fixed link is another one than its carrier
+    for (a, b, distance) in [("base", "arm", 0.6), ("arm", "tip", 0.6), ("base", "hand", 2.6), ("hand", "base", 2.6)] {
+        let found = between(a, b);
+        assert!((found.distance - distance).abs() < 1e-9, "{a} {b}: {}", found.distance);
+        assert_eq!(found.a, Some((robot, parts(a)[0])));
+        assert_eq!(found.b, (robot, parts(b)[0]));
+    }
+    let tip = parts("tip");
+    let far = |a: (ObjectId, Option<&[usize]>)| world.closest_points_of(a, (red, None)).unwrap().unwrap().distance;
+    assert!((far((robot, Some(&tip))) - 3.6).abs() < 1e-9 && (far((robot, None)) - 2.6).abs() < 1e-9);
+    assert_eq!(far((robot, None)), world.closest_points(robot, red).unwrap().unwrap().distance);
+    // a part without a shape has no distance
+    assert_eq!(world.closest_points_of((robot, Some(&[])), (red, None)).unwrap(), None);
+}

@@ -8,7 +8,9 @@ use super::frame_hash::FrameHasher;
 use super::publisher::put_message;
 use super::quantize::get_pose;
 use super::render_proxy::RenderProxy;
+use super::sensors::get_sensor;
 use super::table::{Entry, EntryKind, Snapshot, parse_state, poses_bytes};
+use super::touching::{get_touching, put_touching};
 use super::viewer::{VIEWER_NAME, Viewer};
 use super::visuals::get_looks;
 use super::wire::{ByteReader, Hash, MessageError};
@@ -113,8 +115,10 @@ impl Mirror {
                 let _ = world.remove(id);
             }
         }
+        let mut numbers = 0;
         for entry in &snapshot.entries {
-            slots.push(self.slot(&mut world, entry)?);
+            let slot = self.slot(&mut world, entry, &slots, &mut numbers)?;
+            slots.push(slot);
         }
         self.moving = slots.iter().filter(|slot| !slot.stationary).count();
         self.ids = slots.iter().map(|slot| slot.id).collect();
@@ -124,7 +128,13 @@ impl Mirror {
     }
 
     /// Finds or adds one object of the table, and places it if it is stationary.
-    fn slot(&self, world: &mut World, entry: &Entry<'_>) -> Result<MirroredObject, MessageError> {
+    fn slot(
+        &self,
+        world: &mut World,
+        entry: &Entry<'_>,
+        slots: &[MirroredObject],
+        numbers: &mut usize,
+    ) -> Result<MirroredObject, MessageError> {
         let unfit = |why: &str| MessageError::Unfit(format!("'{}' {why}", entry.name));
         let (stationary, parts) = (entry.stationary, entry.parts);
         if entry.kind == EntryKind::Viewer {
@@ -136,6 +146,11 @@ impl Mirror {
         let id = match (entry.described, world.find(entry.name)) {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
+            (true, old) if entry.kind == EntryKind::Exact => {
+                let _ = old.map(|id| world.remove(id));
+                let sensor = get_sensor(looks, entry.name, |k| slots.get(k)?.id, world, numbers)?;
+                world.replica().add_sensor(sensor).map_err(|why| unfit(&why.to_string()))?
+            }
             (true, old) => {
                 let looks = get_looks(looks, parts as usize, entry.kind == EntryKind::Cloud, &self.base)?;
                 let _ = old.map(|id| world.remove(id));
@@ -146,7 +161,7 @@ impl Mirror {
         if !entry.described && !looks.is_empty() {
             return Err(MessageError::Malformed("trailing bytes"));
         }
-        if entry.kind == EntryKind::Exact && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
+        if entry.kind == EntryKind::Exact && !stationary && world.object(id).is_none_or(|o| o.net_sync().is_none()) {
             return Err(unfit("accepts no messages"));
         }
         let here = world.view().state_range(id).map_or(0, |span| span.parts.len());
@@ -203,6 +218,7 @@ impl Mirror {
         let mut rest = ByteReader(records.rest());
         let contacts = get_contacts(&mut rest, &self.ids, &self.world)?;
         let events = get_events(&mut rest, &self.ids, &self.world)?;
+        let touching = get_touching(&mut rest, &self.ids, &self.world)?;
         rest.end()?;
         let viewer = viewer.ok_or(MessageError::Malformed("no viewer"))?;
         self.apply_messages(&messages)?;
@@ -224,6 +240,7 @@ impl Mirror {
         self.world.replica().set_time(time_s);
         self.world.replica().set_contacts(contacts);
         self.world.replica().set_events(events);
+        self.world.replica().set_touching(touching);
         (self.viewer, self.frame, self.poses) = (viewer, frame, poses);
         Ok(())
     }
@@ -262,10 +279,12 @@ impl Mirror {
             }
         }
         let (shown, events) = (self.world.contacts(), self.world.events());
-        let ids = self.ids.iter().zip(0..).filter(|_| !shown.is_empty() || !events.is_empty());
+        let known = self.world.knows_touching();
+        let ids = self.ids.iter().zip(0..).filter(|_| !shown.is_empty() || !events.is_empty() || known);
         let indices = ids.filter_map(|(id, index)| Some(((*id)?, index))).collect();
         hasher.bytes(|out| put_contacts(out, shown, &indices));
         hasher.bytes(|out| put_events(out, events, &indices, &self.world));
+        hasher.bytes(|out| put_touching(out, &self.world, known, &indices));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
         hash

@@ -6,7 +6,9 @@ use super::contacts::{MAX_CONTACTS, put_contacts};
 use super::events::{MAX_FRAME_EVENTS, StepEvents, put_events};
 use super::frame_hash::FrameHasher;
 use super::quantize::{get_pose, put_pose};
+use super::sensors::{put_sensor, sent};
 use super::table::{Entry, EntryKind, MAX_OBJECTS, put_record, put_snapshot_head, put_state_head};
+use super::touching::put_touching;
 use super::transport::MAX_MESSAGE_BYTES;
 use super::viewer::{VIEWER_NAME, Viewer};
 use super::visuals::{put_appearance, put_surface, put_visuals};
@@ -204,6 +206,7 @@ impl Publisher {
         self.step(world);
         let events: Vec<Event> = self.steps.take().into_iter().filter(|e| self.is_sent(e, world)).collect();
         put_events(&mut state, &events, &self.indices, world);
+        put_touching(&mut state, world, self.events > 0, &self.indices);
         hasher.bytes(|out| out.extend(&state[start..]));
         let (hash, scratch) = hasher.hash();
         self.scratch = scratch;
@@ -238,6 +241,11 @@ impl Publisher {
         let known = self.base.object(id).is_some();
         let exact = known && object.net_sync().is_some() && (self.exact || parts == 0);
         match (exact, parts) {
+            // a camera whose image is made where it is read has no numbers to send
+            (false, 0) if !known && sent(world, id).is_some() => {
+                let still = world.state_of(id).is_none_or(<[f64]>::is_empty);
+                Some((EntryKind::Exact, still, status.enabled, parts))
+            }
             (true, _) => Some((EntryKind::Exact, false, status.enabled, parts)),
             (false, 0) if !known && cloud_of(world, id).is_some() => {
                 Some((EntryKind::Cloud, false, status.enabled, parts))
@@ -277,7 +285,9 @@ impl Publisher {
             if row.stationary {
                 put_row(&mut body, row, world, &mut hasher, &mut 0)?;
             }
-            if described {
+            if described && row.kind == EntryKind::Exact {
+                sent(world, row.id).iter().for_each(|sensor| put_sensor(&mut body, sensor, &self.indices));
+            } else if described {
                 put_visuals(&mut body, object.renderable().map_or(&[], |r| r.visuals()), &self.base);
                 put_surface(&mut body, object.renderable().and_then(|r| r.surface()));
                 if let (EntryKind::Cloud, Some(cloud)) = (row.kind, cloud_of(world, row.id)) {

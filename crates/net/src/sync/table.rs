@@ -5,8 +5,8 @@
 //! SNAPSHOT  revision u32 | exact u8 | 0 u8 | 0 u16 | count u32 | count times: name, size u64, body
 //!           name: length u32, UTF-8
 //!           body: kind u8 | flags u8 | parts u16 | 20 bytes per part if it is stationary | visuals and surface if it is described, and the
-//!                 appearance of a cloud
-//! STATE     revision u32 | count u32 | count times: index u32, size u32, body | contacts
+//!                 appearance of a cloud; of a described object with a message, which is a sensor, its constants
+//! STATE     revision u32 | count u32 | count times: index u32, size u32, body | contacts | events | pairs that touch
 //!           body: 20 bytes per part | the object's own message | the viewer | spheres; nothing if it is not enabled
 //! ```
 //!

@@ -23,7 +23,7 @@ use super::transport::MAX_MESSAGE_BYTES;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_128_with_seed};
 
 /// Version of all messages. Later versions keep the header up to this field.
-pub const VERSION: u16 = 9;
+pub const VERSION: u16 = 10;
 /// Length of the header, bytes.
 pub const HEADER_BYTES: usize = 128;
 /// Length of the name in the header, bytes, the last one zero (thesis §IV.A.6).

@@ -18,7 +18,7 @@ from tumble.typing import Axis, CollisionMeshes, Combine, Contacts, Integrator, 
 _Floats: TypeAlias = NDArray[np.float64]
 _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
-_BodyOrLink: TypeAlias = RigidBody | Articulation | str | tuple[Articulation | str, str]
+_BodyOrLink: TypeAlias = RigidBody | Articulation | Link | str | tuple[Articulation | str, str]
 _Object: TypeAlias = (
     RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
 )
@@ -527,6 +527,22 @@ class RigidBody:
         shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
         1 m. casts_shadow: by default of directional lights.
         """
+    @property
+    def camera(self) -> dict[str, Any] | None:
+        """The camera that it carries, as a dict of the arguments of ``attach_camera``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @camera.setter
+    def camera(self, value: dict[str, Any] | None) -> None: ...
+    @property
+    def light(self) -> dict[str, Any] | None:
+        """The light that it carries, as a dict of the arguments of ``attach_light``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @light.setter
+    def light(self, value: dict[str, Any] | None) -> None: ...
     @property
     def gravity_scale(self) -> float:
         """Factor of the world's gravity, 1 by default."""
@@ -1596,6 +1612,22 @@ class Link:
         shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
         1 m. casts_shadow: by default of directional lights.
         """
+    @property
+    def camera(self) -> dict[str, Any] | None:
+        """The camera that it carries, as a dict of the arguments of ``attach_camera``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @camera.setter
+    def camera(self, value: dict[str, Any] | None) -> None: ...
+    @property
+    def light(self) -> dict[str, Any] | None:
+        """The light that it carries, as a dict of the arguments of ``attach_light``, or None. Setting a dict replaces it, or attaches
+        one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+        have one between them.
+        """
+    @light.setter
+    def light(self, value: dict[str, Any] | None) -> None: ...
 
 @final
 class Articulation:
@@ -2851,7 +2883,7 @@ class World:
 
         A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
         only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+        groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (handles, a
         name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
         with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
         """
@@ -2894,8 +2926,8 @@ class World:
         """
     def closest_points(
         self,
-        a: _Body | Shape,
-        b: _Body | None = None,
+        a: _BodyOrLink | Shape,
+        b: _BodyOrLink | None = None,
         *,
         position: ArrayLike | None = None,
         orientation: ArrayLike | None = None,
@@ -2904,10 +2936,10 @@ class World:
         ignore: _BodyOrLink | Sequence[_BodyOrLink] | None = None,
         as_body: _BodyOrLink | None = None,
     ) -> np.void | None:
-        """Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
-        if ``b`` is None. None if a body has no shape or is disabled.
+        """Returns the closest points of two bodies or links, or of a shape at a pose and a body or link, the nearest one
+        if ``b`` is None. None if one has no shape or is disabled. Two links may be of one articulation.
 
-        a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
+        a: a body or link (a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link)), or a shape; b: a body or link. position, orientation: of a shape. Fields: ``distance``, m, the
         negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
         for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
         the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.
@@ -3210,7 +3242,7 @@ class World:
         on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
         position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
         against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
-        count. cutoff: largest absolute value of a reading.
+        count. cutoff: largest absolute value of a reading; of a camera of any kind the largest depth that it sees, m.
 
         deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
         of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.

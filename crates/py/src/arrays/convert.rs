@@ -7,7 +7,7 @@ use numpy::{
     AllowTypeChange, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyMemoryError, PyOverflowError, PyTypeError};
+use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use tumble::collide::{Mat3, Pose, Quat, Vec3};
@@ -152,20 +152,6 @@ pub fn pose_numbers(pose: &Pose) -> [f64; 7] {
 /// Returns the rotation of four numbers `x, y, z, w`, normalized.
 pub fn unit(q: &[f64]) -> Quat {
     UnitQuaternion::from_quaternion(Quaternion::new(q[3], q[0], q[1], q[2]))
-}
-
-/// Converts an integer, for `from_py_with`. One that does not fit is a value error and not an
-/// overflow.
-pub fn whole_number<'py, T: for<'a> FromPyObject<'a, 'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
-    value.extract::<T>().map_err(|error| {
-        let error: PyErr = error.into();
-        if !error.is_instance_of::<PyOverflowError>(value.py()) {
-            return error;
-        }
-        let written: String =
-            value.str().map_or_else(|_| "the number".into(), |s| s.to_string()).chars().take(40).collect();
-        Error::value(format!("{written}: expected a non-negative integer in range")).into()
-    })
 }
 
 /// Converts a path: `str` or `os.PathLike`.

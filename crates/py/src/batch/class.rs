@@ -1,6 +1,7 @@
 //! The class `Batch`.
 
-use crate::arrays::convert::{numbers, whole_number};
+use crate::arrays::convert::numbers;
+use crate::arrays::whole;
 use crate::batch::bodies::Constants;
 use crate::batch::crew::{Crew, checked};
 use crate::batch::drives::{Drives, Setting};
@@ -184,8 +185,8 @@ impl Batch {
     fn new(
         py: Python<'_>,
         world: &Bound<'_, World>,
-        #[pyo3(from_py_with = whole_number)] n: usize,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = whole::n)] n: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<usize>,
         articulations: Option<Vec<Bound<'_, PyAny>>>,
         configure: Option<&Bound<'_, PyAny>>,
     ) -> Result<Batch> {
@@ -239,7 +240,7 @@ impl Batch {
         &self,
         py: Python<'_>,
         controls: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] substeps: usize,
+        #[pyo3(from_py_with = whole::substeps)] substeps: usize,
         targets: Option<&Bound<'_, PyAny>>,
         policy: Option<&Bound<'_, Policy>>,
         mask: Option<&Bound<'_, PyAny>>,

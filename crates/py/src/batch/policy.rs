@@ -8,6 +8,7 @@
 //! machine.
 
 use crate::arrays::convert::{Numbers, array, numbers, shown};
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -162,7 +163,7 @@ impl Policy {
         &self,
         py: Python<'py>,
         observation: &Bound<'_, PyAny>,
-        i: usize,
+        #[pyo3(from_py_with = whole::i)] i: usize,
     ) -> Result<Bound<'py, PyArray1<f64>>> {
         let given = numbers(observation, "observation")?;
         if given.shape != [self.inputs()] {

@@ -2,7 +2,8 @@
 
 #![allow(clippy::approx_constant, reason = "defaults that Python shows as numbers")]
 
-use crate::arrays::convert::{vec3, vec3_or, whole_number};
+use crate::arrays::convert::{vec3, vec3_or};
+use crate::arrays::whole;
 use crate::behaviors;
 use crate::errors::{Error, Result};
 use crate::world::add::own_place;
@@ -48,7 +49,7 @@ impl Panel {
     fn new(
         body: Py<PyAny>,
         area: f64,
-        #[pyo3(from_py_with = whole_number)] part: usize,
+        #[pyo3(from_py_with = whole::part)] part: usize,
         point: Option<&Bound<'_, PyAny>>,
         normal: Option<&Bound<'_, PyAny>>,
         lift_slope: f64,

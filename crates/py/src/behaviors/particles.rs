@@ -2,7 +2,8 @@
 
 #![allow(clippy::approx_constant, reason = "defaults that Python shows as numbers")]
 
-use crate::arrays::convert::{pose, vec3, vec3_or, whole_number};
+use crate::arrays::convert::{pose, vec3, vec3_or};
+use crate::arrays::whole;
 use crate::behaviors::{appearance, material, placed, rows};
 use crate::errors::{Error, Result};
 use crate::objects::handle::handle;
@@ -40,12 +41,12 @@ impl Emitter {
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
         body: Option<Py<PyAny>>,
-        #[pyo3(from_py_with = whole_number)] part: usize,
+        #[pyo3(from_py_with = whole::part)] part: usize,
         radius: f64,
         speed: Option<&Bound<'_, PyAny>>,
         half_angle: f64,
         lifetime: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] burst: u32,
+        #[pyo3(from_py_with = whole::burst)] burst: u32,
         rate: f64,
         start: f64,
         end: Option<f64>,

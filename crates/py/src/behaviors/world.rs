@@ -1,6 +1,7 @@
 //! The methods of `World` that add soft bodies, particles, flocks and fields.
 
-use crate::arrays::convert::{pose, some, vec3_or, whole_number};
+use crate::arrays::convert::{pose, some, vec3_or};
+use crate::arrays::whole;
 use crate::behaviors::field::{self, Field};
 use crate::behaviors::flock::{PyFlock, steering};
 use crate::behaviors::particles::{self, Emitter, Given, Particles};
@@ -31,7 +32,7 @@ impl World {
         &self,
         py: Python<'_>,
         name: &str,
-        nodes: Option<[usize; 2]>,
+        #[pyo3(from_py_with = whole::nodes)] nodes: Option<[usize; 2]>,
         size: Option<&Bound<'_, PyAny>>,
         mass: f64,
         stiffness: Option<&Bound<'_, PyAny>>,
@@ -70,7 +71,7 @@ impl World {
         &self,
         py: Python<'_>,
         name: &str,
-        nodes: Option<[usize; 3]>,
+        #[pyo3(from_py_with = whole::nodes)] nodes: Option<[usize; 3]>,
         size: Option<&Bound<'_, PyAny>>,
         mass: f64,
         stiffness: Option<&Bound<'_, PyAny>>,
@@ -121,8 +122,8 @@ impl World {
         py: Python<'py>,
         name: &str,
         emitters: Vec<PyRef<'py, Emitter>>,
-        #[pyo3(from_py_with = whole_number)] capacity: usize,
-        #[pyo3(from_py_with = whole_number)] seed: u64,
+        #[pyo3(from_py_with = whole::capacity)] capacity: usize,
+        #[pyo3(from_py_with = whole::seed)] seed: u64,
         mass: f64,
         radius: f64,
         friction: f64,
@@ -132,7 +133,7 @@ impl World {
         quadratic_drag: f64,
         wind: Option<&Bound<'py, PyAny>>,
         collidable: bool,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'py, PyAny>>,
         two_way: bool,
         color: Option<&Bound<'py, PyAny>>,

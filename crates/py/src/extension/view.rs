@@ -6,7 +6,8 @@
 //! refer to it. The arrays of one call are reused by the next, unless Python kept any. After the
 //! call the view raises an error, and its force arrays are read once and not again.
 
-use crate::arrays::convert::{vec3, whole_number};
+use crate::arrays::convert::vec3;
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::extension::columns::Arrays;
 use crate::extension::layout::Layout;
@@ -213,7 +214,7 @@ impl View {
             (Some(part), Some((id, ..))) if part.is_instance_of::<PyString>() => {
                 self.layout.link(id, &part.extract::<String>()?)?
             }
-            (Some(part), _) => whole_number(part)?,
+            (Some(part), _) => whole::part(part)?,
         };
         match part < rows.len() {
             true => Ok(rows.start + part),
@@ -233,7 +234,7 @@ impl View {
     fn apply_force(
         &self,
         py: Python<'_>,
-        #[pyo3(from_py_with = whole_number)] row: usize,
+        #[pyo3(from_py_with = whole::row)] row: usize,
         force: &Bound<'_, PyAny>,
         point: &Bound<'_, PyAny>,
     ) -> Result<()> {

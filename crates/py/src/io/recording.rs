@@ -1,6 +1,7 @@
 //! Recordings: written from worlds, read back as arrays.
 
-use crate::arrays::convert::{path, whole_number};
+use crate::arrays::convert::path;
+use crate::arrays::whole;
 use crate::errors::{Error, Result, caught};
 use crate::world::class::World;
 use crate::world::inner::Inner;
@@ -119,8 +120,8 @@ impl Recorder {
         &self,
         py: Python<'_>,
         world: &Bound<'_, World>,
-        #[pyo3(from_py_with = whole_number)] n: u32,
-        #[pyo3(from_py_with = whole_number)] every: u32,
+        #[pyo3(from_py_with = whole::n)] n: u32,
+        #[pyo3(from_py_with = whole::every)] every: u32,
     ) -> Result<()> {
         if every == 0 {
             return Err(Error::value("every is 0; it must be at least 1"));

@@ -1,6 +1,7 @@
 //! The sound of a run.
 
-use crate::arrays::convert::{some, whole_number};
+use crate::arrays::convert::some;
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::world::class::World;
 use crate::world::gc::{Anchor, anchor};
@@ -101,7 +102,7 @@ impl Soundtrack {
     }
 
     /// Steps the world n times and listens to each frame.
-    fn run(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: u32) -> Result<()> {
+    fn run(&self, py: Python<'_>, #[pyo3(from_py_with = whole::n)] n: u32) -> Result<()> {
         for _ in 0..n {
             self.shared.work(py, |inner| inner.step())?;
             self.frame(py)?;

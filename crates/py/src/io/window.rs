@@ -7,6 +7,7 @@
 //! | number of the frame, simulated time (s), length of the rest, little-endian | 8, 8, 4 |
 //! | title, size and views in postcard; a NetSync snapshot; a NetSync state | any |
 
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::world::class::World;
 use crate::world::pickling::SceneRecord;
@@ -64,7 +65,7 @@ impl _WindowFeed {
         py: Python<'py>,
         world: &Bound<'_, World>,
         title: String,
-        size: [u32; 2],
+        #[pyo3(from_py_with = whole::size)] size: [u32; 2],
     ) -> Result<Bound<'py, PyBytes>> {
         let scene = world.get().shared.read(|inner| Ok(SceneRecord::of(&inner.scene)))?;
         Ok(PyBytes::new(py, &message(0, 0, 0.0, &seal(HEAD, &Opening { title, size, scene })?)?))

@@ -5,7 +5,7 @@ use crate::errors::{Error, Result};
 use pyo3::prelude::*;
 use tumble::collide::{Shape, Vec3};
 use tumble::dynamics::{Appearance, Renderable, RigidBody as Rigid};
-use tumble::scene::{AppearanceSpec, Pattern};
+use tumble::scene::{AppearanceSpec, Pattern, check_texture};
 
 /// Colors that new bodies take in turn, sRGB.
 const PALETTE: [[f32; 3]; 7] = [
@@ -87,11 +87,14 @@ pub fn given(value: &Bound<'_, PyAny>) -> Result<AppearanceSpec> {
     let (pattern, detail): (String, String) = (field("pattern")?.extract()?, field("detail")?.extract()?);
     let texture = field("texture")?;
     let texture = if texture.is_none() { None } else { Some(path(&texture)?) };
-    if let Some(missing) = texture.as_ref().filter(|file| !file.is_file()) {
-        return Err(Error::value(format!(
-            "appearance.texture: there is no file {}; expected a PNG file",
-            missing.display()
-        )));
+    if let Some(file) = &texture {
+        let why = match file.is_file() {
+            true => check_texture(file).err(),
+            false => Some("there is no such file".to_owned()),
+        };
+        if let Some(why) = why {
+            return Err(Error::value(format!("appearance.texture is {}: {why}; expected a PNG file", file.display())));
+        }
     }
     Ok(AppearanceSpec {
         color: color("color")?,

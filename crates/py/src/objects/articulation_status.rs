@@ -1,6 +1,6 @@
 //! The status of an articulated body of a world, as of a rigid one: mode, switches, sleep, collision filter and contacts.
 
-use crate::arrays::convert::whole_number;
+use crate::arrays::whole;
 use crate::choices::{MODES, meaning, word};
 use crate::errors::Result;
 use crate::objects::articulation::Articulation;
@@ -81,7 +81,7 @@ impl Articulation {
     }
 
     #[setter]
-    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u8) -> Result<()> {
+    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole::group)] value: u8) -> Result<()> {
         self.set_groups(py, Some(query::group(value)?), None)
     }
 

@@ -1,8 +1,9 @@
 //! A rigid body of a world: a handle that reads from the world at each use.
 
 use crate::arrays::convert::{
-    Numbers, array, numbers, pose, quaternion, rotation, shown, some, symmetric, vec3, vec3_or, vector, whole_number,
+    Numbers, array, numbers, pose, quaternion, rotation, shown, some, symmetric, vec3, vec3_or, vector,
 };
+use crate::arrays::whole;
 use crate::choices::{MODES, meaning, word};
 use crate::errors::{Error, Result};
 use crate::objects::appearance;
@@ -247,7 +248,7 @@ impl RigidBody {
     }
 
     #[setter]
-    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u8) -> Result<()> {
+    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole::group)] value: u8) -> Result<()> {
         let group = query::group(value)?;
         self.change(py, |body| body.group = group)
     }

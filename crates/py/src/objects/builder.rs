@@ -1,6 +1,7 @@
 //! Makes descriptions of articulated bodies link by link.
 
-use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or, whole_number};
+use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or};
+use crate::arrays::whole;
 use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
 use crate::objects::appearance::{self, palette};
@@ -92,8 +93,8 @@ impl ArticulationBuilder {
     /// properties of ``RigidBody``. color: sRGB, shape (3,); appearance: a ``tumble.Appearance`` instead.
     #[pyo3(signature = (name, parent=None, *, joint="revolute", axis=None, position=None, orientation=None, shape=None, shape_position=None,
         shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, joint_friction=0.0,
-        armature=0.0, stiffness=0.0, rest=None, drive=None, max_velocity=None, effort=None, q=None, qd=None, friction=0.5, restitution=0.0, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
-        twist_limits=None, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None))]
+        armature=0.0, stiffness=0.0, rest=None, drive=None, max_velocity=None, effort=None, q=None, qd=None, collidable=true, color=None, cone=None, contacts="surface", group=0, mask=None,
+        twist_limits=None, appearance=None, **surface))]
     #[pyo3(
         text_signature = "($self, name, parent=None, *, joint='revolute', axis=(0.0, 0.0, 1.0), position=None, orientation=None, shape=None, \
         shape_position=None, shape_orientation=None, mass=None, density=None, center_of_mass=None, inertia=None, limits=None, joint_damping=0.0, \
@@ -128,29 +129,23 @@ impl ArticulationBuilder {
         effort: Option<f64>,
         q: Option<&Bound<'_, PyAny>>,
         qd: Option<&Bound<'_, PyAny>>,
-        friction: f64,
-        restitution: f64,
         collidable: bool,
         color: Option<&Bound<'_, PyAny>>,
         cone: Option<f64>,
         contacts: &str,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         twist_limits: Option<&Bound<'_, PyAny>>,
-        static_friction: Option<f64>,
-        stribeck_speed: Option<f64>,
-        friction_scale: Option<&Bound<'_, PyAny>>,
-        rolling_friction: Option<f64>,
-        torsional_friction: Option<f64>,
-        tangential_restitution: Option<f64>,
-        adhesion: Option<f64>,
-        surface_velocity: Option<&Bound<'_, PyAny>>,
         appearance: Option<&Bound<'_, PyAny>>,
+        surface: Option<&Bound<'_, PyDict>>,
     ) -> Result<()> {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
         }
         let axis = vec3_or(axis, "axis", Vec3::z())?;
+        if axis == Vec3::zeros() {
+            return Err(Error::value("axis is [0, 0, 0]; expected a direction, any length above 0"));
+        }
         let joint = match meaning("joint", joint, JOINT_TYPES)? {
             JointType::Revolute => Joint::revolute(axis),
             JointType::Prismatic => Joint::prismatic(axis),
@@ -158,20 +153,7 @@ impl ArticulationBuilder {
             JointType::Fixed => Joint::Fixed,
             JointType::Floating => Joint::Floating,
         };
-        let surface = Given::new(
-            [
-                Some(friction),
-                Some(restitution),
-                static_friction,
-                stribeck_speed,
-                rolling_friction,
-                torsional_friction,
-                tangential_restitution,
-                adhesion,
-            ],
-            friction_scale,
-            surface_velocity,
-        )?;
+        let surface = Given::of_words("add_link", surface)?;
         let mut link = LinkBuilder::new(name, joint)
             .with_pose(pose(position, orientation)?)
             .with_joint_damping(joint_damping)
@@ -229,7 +211,12 @@ impl ArticulationBuilder {
     /// mass, kg, or density, kg/m³: of the shape, for a link without a mass. friction, restitution, the other constants of surfaces,
     /// contacts, group, mask, color: by default those of the link; appearance: a ``tumble.Appearance`` instead of the color. visible: whether it is drawn.
     #[pyo3(signature = (link, shape, position=None, orientation=None, *, collidable=true, one_way=None, sensor=false, mass=None, density=None,
-        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=true, static_friction=None, stribeck_speed=None, friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None))]
+        contacts=None, group=None, mask=None, color=None, visible=true, appearance=None, **surface))]
+    #[pyo3(
+        text_signature = "($self, link, shape, position=None, orientation=None, *, collidable=True, one_way=None, sensor=False, mass=None, density=None, \
+        friction=None, restitution=None, contacts=None, group=None, mask=None, color=None, visible=True, static_friction=None, stribeck_speed=None, \
+        friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None)"
+    )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_shape(
         &self,
@@ -242,41 +229,19 @@ impl ArticulationBuilder {
         sensor: bool,
         mass: Option<f64>,
         density: Option<f64>,
-        friction: Option<f64>,
-        restitution: Option<f64>,
         contacts: Option<&str>,
-        group: Option<u8>,
+        #[pyo3(from_py_with = whole::group)] group: Option<u8>,
         mask: Option<&Bound<'_, PyAny>>,
         color: Option<&Bound<'_, PyAny>>,
         visible: bool,
-        static_friction: Option<f64>,
-        stribeck_speed: Option<f64>,
-        friction_scale: Option<&Bound<'_, PyAny>>,
-        rolling_friction: Option<f64>,
-        torsional_friction: Option<f64>,
-        tangential_restitution: Option<f64>,
-        adhesion: Option<f64>,
-        surface_velocity: Option<&Bound<'_, PyAny>>,
         appearance: Option<&Bound<'_, PyAny>>,
+        surface: Option<&Bound<'_, PyDict>>,
     ) -> Result<()> {
         self.has(link)?;
         if mass.is_some() && density.is_some() {
             return Err(Error::value(format!("shape of link '{link}': expected a mass or a density, not both")));
         }
-        let surface = Given::new(
-            [
-                friction,
-                restitution,
-                static_friction,
-                stribeck_speed,
-                rolling_friction,
-                torsional_friction,
-                tangential_restitution,
-                adhesion,
-            ],
-            friction_scale,
-            surface_velocity,
-        )?;
+        let surface = Given::of_words("add_shape", surface)?;
         let one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
         let mode = contacts.map(|contacts| meaning("contacts", contacts, ContactMode::NAMES)).transpose()?;
         let (group, mask) =

@@ -1,6 +1,7 @@
 //! One link of an articulated body.
 
-use crate::arrays::convert::{symmetric, vec3, vector, whole_number};
+use crate::arrays::convert::{symmetric, vec3, vector};
+use crate::arrays::whole;
 use crate::errors::Result;
 use crate::objects::articulation::Articulation;
 use crate::objects::body::link_inertia;
@@ -25,11 +26,11 @@ pub struct Link {
 }
 
 impl Link {
-    pub(super) fn articulation(&self) -> &Py<Articulation> {
+    pub(crate) fn articulation(&self) -> &Py<Articulation> {
         &self.articulation
     }
 
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
@@ -136,7 +137,7 @@ impl Link {
     }
 
     #[setter]
-    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u8) -> Result<()> {
+    fn set_group(&self, py: Python<'_>, #[pyo3(from_py_with = whole::group)] value: u8) -> Result<()> {
         self.set_groups(py, Some(query::group(value)?), None)
     }
 

@@ -1,11 +1,12 @@
 //! Cameras and lights that bodies and links carry.
 
-use crate::arrays::convert::{some, vec3_or};
+use crate::arrays::convert::{array, some, vec3_or, vector};
 use crate::errors::{Error, Result};
 use crate::objects::body::RigidBody;
 use crate::objects::link::Link;
 use pyo3::prelude::*;
-use tumble::collide::{Pose, Vec3};
+use pyo3::types::PyDict;
+use tumble::collide::{Pose, Quat, Vec3};
 use tumble::dynamics::{ArticulatedBody, CameraCarrier, CameraMount, LightCarrier, LightMount, Spread};
 use tumble::scene::facing;
 
@@ -75,7 +76,92 @@ pub fn light(
     Ok(LightMount { part: 0, pose, spread, color, intensity, casts_shadow })
 }
 
-/// Gives a class the methods that attach a camera and a light, by its own `attach`.
+/// Returns the arguments of a camera.
+fn camera_words<'py>(py: Python<'py>, mount: &CameraMount) -> Result<Bound<'py, PyDict>> {
+    let CameraMount { name: _, part: _, pose, vertical_fov, near, far } = mount;
+    let words = PyDict::new(py);
+    words.set_item("position", vector(py, &pose.translation.vector))?;
+    words.set_item("forward", vector(py, &(pose.rotation * Vec3::x())))?;
+    words.set_item("up", vector(py, &(pose.rotation * Vec3::z())))?;
+    [("fov_deg", vertical_fov.to_degrees()), ("near", *near), ("far", *far)]
+        .iter()
+        .try_for_each(|(word, number)| words.set_item(word, number))?;
+    Ok(words)
+}
+
+/// Returns the arguments of a light.
+fn light_words<'py>(py: Python<'py>, mount: &LightMount) -> Result<Bound<'py, PyDict>> {
+    let LightMount { part: _, pose, spread, color, intensity, casts_shadow } = mount;
+    let words = PyDict::new(py);
+    match spread {
+        Spread::Point { radius } => {
+            words.set_item("kind", "point")?;
+            words.set_item("position", vector(py, &pose.translation.vector))?;
+            words.set_item("radius", radius)?;
+        }
+        Spread::Directional => {
+            words.set_item("kind", "directional")?;
+            words.set_item("direction", vector(py, &(pose.rotation * Vec3::x())))?;
+        }
+    }
+    words.set_item("color", array(py, color))?;
+    words.set_item("intensity", intensity)?;
+    words.set_item("casts_shadow", casts_shadow)?;
+    Ok(words)
+}
+
+/// Arguments by name.
+struct Words<'a, 'py>(&'static str, &'a Bound<'py, PyDict>);
+
+impl<'py> Words<'_, 'py> {
+    /// Refuses a name that is not known.
+    fn only(&self, known: &[&str]) -> Result<()> {
+        for word in self.1.keys() {
+            let word = word.str()?.to_string();
+            if !known.contains(&word.as_str()) {
+                let Words(what, _) = self;
+                return Err(Error::value(format!("{what}: unknown argument '{word}'; expected {}", known.join(", "))));
+            }
+        }
+        Ok(())
+    }
+
+    fn get(&self, word: &str) -> Result<Option<Bound<'py, PyAny>>> {
+        Ok(self.1.get_item(word)?.filter(|value| !value.is_none()))
+    }
+
+    fn number(&self, word: &str, usual: f64) -> Result<f64> {
+        let wrong = |_| Error::value(format!("{}: {word}: expected a number", self.0));
+        self.get(word)?.map_or(Ok(usual), |value| value.extract::<f64>().map_err(wrong))
+    }
+}
+
+/// Reads a camera from its arguments.
+fn camera_of(words: &Bound<'_, PyDict>) -> Result<CameraMount> {
+    let words = Words("camera", words);
+    words.only(&["position", "forward", "up", "fov_deg", "near", "far"])?;
+    let [position, forward, up] = [words.get("position")?, words.get("forward")?, words.get("up")?];
+    let usual = CameraMount::new("", 0, Pose::identity());
+    let depths = [words.number("near", usual.near)?, words.number("far", usual.far)?];
+    camera(position.as_ref(), [forward.as_ref(), up.as_ref()], words.number("fov_deg", 40.0)?, depths)
+}
+
+/// Reads a light from its arguments.
+fn light_of(words: &Bound<'_, PyDict>) -> Result<LightMount> {
+    let words = Words("light", words);
+    words.only(&["kind", "position", "direction", "color", "intensity", "radius", "casts_shadow"])?;
+    let wrong = |what: &str| Error::value(format!("light: {what}"));
+    let kind = words.get("kind")?.map_or(Ok("point".to_owned()), |kind| kind.extract::<String>());
+    let kind = kind.map_err(|_| wrong("kind: expected 'point' or 'directional'"))?;
+    let shadow = words.get("casts_shadow")?.map(|casts| casts.extract::<bool>()).transpose();
+    let shadow = shadow.map_err(|_| wrong("casts_shadow: expected True or False"))?;
+    let [position, direction, color] = [words.get("position")?, words.get("direction")?, words.get("color")?];
+    let numbers = [words.number("intensity", 1.0)?, words.number("radius", 0.1)?];
+    light(&kind, [position.as_ref(), direction.as_ref()], color.as_ref(), numbers, shadow)
+}
+
+/// Gives a class the methods that attach a camera and a light, and properties that read, replace and remove them, by its own `carried` and
+/// `carry`.
 macro_rules! attachments {
     ($class:ident) => {
         #[pymethods]
@@ -98,7 +184,11 @@ macro_rules! attachments {
                 near: f64,
                 far: f64,
             ) -> Result<()> {
-                self.attach(py, Mount::Camera(camera(position, [forward, up], fov_deg, [near, far])?))
+                let camera = camera(position, [forward, up], fov_deg, [near, far])?;
+                if self.carried()?.0.is_some() {
+                    return Err(self.full("camera"));
+                }
+                self.carry(py, Mount::Camera(Some(camera)))
             }
 
             /// Attaches a light, at most one, which scenes keep. kind: ``"point"``, with position, shape (3,), m, and radius, m, or
@@ -118,7 +208,37 @@ macro_rules! attachments {
                 radius: f64,
                 casts_shadow: Option<bool>,
             ) -> Result<()> {
-                self.attach(py, Mount::Light(light(kind, [position, direction], color, [intensity, radius], casts_shadow)?))
+                let light = light(kind, [position, direction], color, [intensity, radius], casts_shadow)?;
+                if self.carried()?.1.is_some() {
+                    return Err(self.full("light"));
+                }
+                self.carry(py, Mount::Light(Some(light)))
+            }
+
+            /// The camera that it carries, as a dict of the arguments of ``attach_camera``, or None. Setting a dict replaces it, or attaches
+            /// one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+            /// have one between them.
+            #[getter]
+            fn camera<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyDict>>> {
+                self.carried()?.0.map(|camera| camera_words(py, &camera)).transpose()
+            }
+
+            #[setter]
+            fn set_camera(&self, py: Python<'_>, value: Option<&Bound<'_, PyDict>>) -> Result<()> {
+                self.carry(py, Mount::Camera(value.map(camera_of).transpose()?))
+            }
+
+            /// The light that it carries, as a dict of the arguments of ``attach_light``, or None. Setting a dict replaces it, or attaches
+            /// one; arguments that the dict lacks have their defaults. Setting None removes it. A link and the links fixed to it
+            /// have one between them.
+            #[getter]
+            fn light<'py>(&self, py: Python<'py>) -> Result<Option<Bound<'py, PyDict>>> {
+                self.carried()?.1.map(|light| light_words(py, &light)).transpose()
+            }
+
+            #[setter]
+            fn set_light(&self, py: Python<'_>, value: Option<&Bound<'_, PyDict>>) -> Result<()> {
+                self.carry(py, Mount::Light(value.map(light_of).transpose()?))
             }
         }
     };
@@ -127,58 +247,72 @@ macro_rules! attachments {
 attachments!(RigidBody);
 attachments!(Link);
 
-/// A camera or a light that is attached.
+/// The camera or the light that something carries from now on; `None` for none.
 enum Mount {
-    Camera(CameraMount),
-    Light(LightMount),
+    Camera(Option<CameraMount>),
+    Light(Option<LightMount>),
 }
 
-impl Mount {
-    fn name(&self) -> &'static str {
-        if let Mount::Camera(_) = self { "camera" } else { "light" }
-    }
+/// The first camera and the first light, in the frame of the shape of a body, or of the link.
+type Carried = (Option<CameraMount>, Option<LightMount>);
+
+fn carried_in(cameras: &[CameraMount], lights: &[LightMount], part: usize, to_frame: Pose) -> Carried {
+    let camera = cameras.iter().find(|camera| camera.part == part).cloned();
+    let light = lights.iter().find(|light| light.part == part).cloned();
+    (
+        camera.map(|camera| CameraMount { pose: to_frame * camera.pose, ..camera }),
+        light.map(|light| LightMount { pose: to_frame * light.pose, ..light }),
+    )
 }
 
 impl RigidBody {
-    fn attach(&self, py: Python<'_>, mount: Mount) -> Result<()> {
-        let carries = self.constant(|body| match mount {
-            Mount::Camera(_) => !body.cameras().is_empty(),
-            Mount::Light(_) => !body.lights().is_empty(),
-        })?;
-        if carries {
-            let (name, what) = (&self.place.name, mount.name());
-            return Err(Error::value(format!("'{name}' has a {what} already, and carries at most one")));
-        }
-        self.change(py, |body| {
-            *body = match mount {
-                Mount::Camera(camera) => body.clone().with_camera(camera),
-                Mount::Light(light) => body.clone().with_light(light),
-            }
+    fn full(&self, what: &str) -> Error {
+        Error::value(format!("'{}' has a {what} already, and carries at most one", self.place.name))
+    }
+
+    fn carried(&self) -> Result<Carried> {
+        self.constant(|body| {
+            let to_frame = Pose::from_parts(body.shape().center_of_mass().into(), Quat::identity());
+            carried_in(body.cameras(), body.lights(), 0, to_frame)
+        })
+    }
+
+    fn carry(&self, py: Python<'_>, mount: Mount) -> Result<()> {
+        self.change(py, |body| match mount {
+            Mount::Camera(camera) => body.set_cameras(camera),
+            Mount::Light(light) => body.set_lights(light),
         })
     }
 }
 
 impl Link {
-    /// Attaches a camera or a light, of which a link and the links fixed to it carry at most one.
-    fn attach(&self, py: Python<'_>, mount: Mount) -> Result<()> {
+    fn full(&self, what: &str) -> Error {
+        let most = "with the links fixed to it it carries at most one";
+        Error::value(format!("'{}' has a {what} already; {most}", self.name()))
+    }
+
+    fn carried(&self) -> Result<Carried> {
+        let name = self.name();
+        self.articulation()
+            .get()
+            .of_body(|body| {
+                let frame = body.model().frame(name)?;
+                let part = frame.link.unwrap_or(body.model().links().len());
+                Some(carried_in(body.cameras(), body.lights(), part, frame.pose.inverse()))
+            })?
+            .ok_or_else(|| Error::value(format!("there is no link '{name}'")))
+    }
+
+    fn carry(&self, py: Python<'_>, mount: Mount) -> Result<()> {
         let place = self.articulation().get().in_world()?;
         place.write(py, |inner| {
             let body = inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
-            let part = body.model().frame(self.name()).map(|frame| frame.link.unwrap_or(body.model().links().len()));
-            let carries = |part: usize| match mount {
-                Mount::Camera(_) => body.cameras().iter().any(|camera| camera.part == part),
-                Mount::Light(_) => body.lights().iter().any(|light| light.part == part),
-            };
-            if part.is_some_and(carries) {
-                let (name, what) = (self.name(), mount.name());
-                let most = "with the links fixed to it it carries at most one";
-                return Err(Error::value(format!("'{name}' has a {what} already; {most}")));
-            }
             match mount {
                 Mount::Camera(camera) => {
-                    body.add_camera(self.name(), CameraMount { name: self.name().to_owned(), ..camera })?;
+                    let named = camera.map(|camera| CameraMount { name: self.name().to_owned(), ..camera });
+                    body.set_cameras(self.name(), named)?;
                 }
-                Mount::Light(light) => body.add_light(self.name(), light)?,
+                Mount::Light(light) => body.set_lights(self.name(), light)?,
             }
             Ok(())
         })

@@ -1,5 +1,6 @@
 //! Measuring sensors of a world, and the mapping of their readings.
 
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::objects::handle::handle;
 use crate::objects::place::Place;
@@ -37,7 +38,7 @@ impl Sensor {
     }
 
     /// Starts its noise anew from a seed, a whole number of at most 64 bits. The reading and the bias stay.
-    fn seed(&self, py: Python<'_>, seed: u64) -> Result<()> {
+    fn seed(&self, py: Python<'_>, #[pyo3(from_py_with = whole::seed)] seed: u64) -> Result<()> {
         self.place.write(py, |inner| Ok(inner.world.seed_sensor(self.place.id, seed)?))
     }
 }

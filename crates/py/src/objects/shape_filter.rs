@@ -1,5 +1,6 @@
 //! Collision group, mask and sensor of single shapes of a compound body and of the links of an articulation.
 
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
@@ -77,7 +78,7 @@ impl RigidBody {
         &self,
         py: Python<'_>,
         shape: Which,
-        group: Option<u8>,
+        #[pyo3(from_py_with = whole::group)] group: Option<u8>,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: Option<bool>,
     ) -> Result<()> {
@@ -109,7 +110,7 @@ impl Articulation {
         py: Python<'_>,
         link: &str,
         shape: Which,
-        group: Option<u8>,
+        #[pyo3(from_py_with = whole::group)] group: Option<u8>,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: Option<bool>,
     ) -> Result<()> {

@@ -4,62 +4,85 @@ use crate::arrays::convert::{array, some};
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::dynamics::{ArticulatedBody, Material};
 
+/// Names of the numbers among the constants of a surface.
+const NUMBERS: [&str; 8] = [
+    "friction",
+    "restitution",
+    "static_friction",
+    "stribeck_speed",
+    "rolling_friction",
+    "torsional_friction",
+    "tangential_restitution",
+    "adhesion",
+];
+
+/// Returns the places of these numbers.
+fn places(m: &mut Material) -> [&mut f64; NUMBERS.len()] {
+    [
+        &mut m.friction,
+        &mut m.restitution,
+        &mut m.static_friction,
+        &mut m.stribeck_speed,
+        &mut m.rolling_friction,
+        &mut m.torsional_friction,
+        &mut m.tangential_restitution,
+        &mut m.adhesion,
+    ]
+}
+
 /// Returns constants as a dict.
 fn as_dict<'py>(py: Python<'py>, m: &Material) -> Result<Bound<'py, PyDict>> {
     let constants = PyDict::new(py);
-    let numbers = [
-        ("friction", m.friction),
-        ("restitution", m.restitution),
-        ("static_friction", m.static_friction),
-        ("stribeck_speed", m.stribeck_speed),
-        ("rolling_friction", m.rolling_friction),
-        ("torsional_friction", m.torsional_friction),
-        ("tangential_restitution", m.tangential_restitution),
-        ("adhesion", m.adhesion),
-    ];
-    numbers.iter().try_for_each(|(name, value)| constants.set_item(name, value))?;
+    let mut own = *m;
+    let numbers = NUMBERS.iter().zip(places(&mut own));
+    numbers.into_iter().try_for_each(|(name, value)| constants.set_item(name, *value))?;
     constants.set_item("friction_scale", array(py, m.friction_scale.as_slice()))?;
     constants.set_item("surface_velocity", array(py, m.surface_velocity.as_slice()))?;
     Ok(constants)
 }
 
-/// Constants that a call sets: the numbers in the order of the arguments, then the vectors.
+/// Constants that a call sets, by the names of ``as_dict``.
+#[derive(Default)]
 pub struct Given {
-    numbers: [Option<f64>; 8],
+    numbers: [Option<f64>; NUMBERS.len()],
     scale: Option<[f64; 3]>,
     velocity: Option<[f64; 3]>,
 }
 
 impl Given {
-    /// Converts the constants, the numbers in the order of the fields of ``as_dict``.
-    pub fn new(
-        numbers: [Option<f64>; 8],
-        scale: Option<&Bound<'_, PyAny>>,
-        velocity: Option<&Bound<'_, PyAny>>,
-    ) -> Result<Given> {
-        let scale = scale.map(|value| some::<3>(value, "friction_scale")).transpose()?;
-        let velocity = velocity.map(|value| some::<3>(value, "surface_velocity")).transpose()?;
-        Ok(Given { numbers, scale, velocity })
+    /// Reads the keyword arguments of surfaces of `function`: all that it has no arguments of its own for. None is as not given.
+    pub fn of_words(function: &str, words: Option<&Bound<'_, PyDict>>) -> Result<Given> {
+        let mut given = Given::default();
+        for (word, value) in words.into_iter().flat_map(|words| words.iter()) {
+            let word: String = word.extract()?;
+            let number = NUMBERS.iter().position(|name| *name == word);
+            match (word.as_str(), number) {
+                ("friction_scale" | "surface_velocity", _) | (_, Some(_)) if value.is_none() => {}
+                ("friction_scale", _) => given.scale = Some(some::<3>(&value, &word)?),
+                ("surface_velocity", _) => given.velocity = Some(some::<3>(&value, &word)?),
+                (_, Some(k)) => {
+                    let wrong = |e| PyTypeError::new_err(format!("{word}: {e}"));
+                    given.numbers[k] =
+                        Some(value.extract::<f64>().map_err(|e| wrong(e.value(value.py()).to_string()))?);
+                }
+                _ => {
+                    let unknown = format!("{function}() got an unexpected keyword argument '{word}'");
+                    return Err(PyTypeError::new_err(unknown).into());
+                }
+            }
+        }
+        Ok(given)
     }
 
     /// Returns the constants with those that are given; `None` if none is.
     pub fn over(&self, mut m: Material) -> Option<Material> {
-        let places = [
-            &mut m.friction,
-            &mut m.restitution,
-            &mut m.static_friction,
-            &mut m.stribeck_speed,
-            &mut m.rolling_friction,
-            &mut m.torsional_friction,
-            &mut m.tangential_restitution,
-            &mut m.adhesion,
-        ];
         let mut given = self.scale.is_some() || self.velocity.is_some();
-        for (place, number) in places.into_iter().zip(self.numbers) {
+        for (place, number) in places(&mut m).into_iter().zip(self.numbers) {
             given |= number.is_some();
             number.iter().for_each(|number| *place = *number);
         }
@@ -104,39 +127,19 @@ impl RigidBody {
 
 /// Gives a class the method `set_shape_material`, whose first arguments say which shape; `$set` sets the constants that are given.
 macro_rules! set_shape_material {
-    ($class:ident, ($($place:ident: $kind:ty),+), $set:expr, $(#[$doc:meta])+) => {
+    ($class:ident, ($($place:ident: $kind:ty),+), $shown:literal, $set:expr, $(#[$doc:meta])+) => {
         #[pymethods]
         impl $class {
             $(#[$doc])+
-            #[pyo3(signature = ($($place),+, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None,
-                rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None))]
-            #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+            #[pyo3(signature = ($($place),+, **surface))]
+            #[pyo3(text_signature = $shown)]
             fn set_shape_material(
                 &self,
                 py: Python<'_>,
                 $($place: $kind),+,
-                friction: Option<f64>,
-                restitution: Option<f64>,
-                static_friction: Option<f64>,
-                stribeck_speed: Option<f64>,
-                friction_scale: Option<&Bound<'_, PyAny>>,
-                rolling_friction: Option<f64>,
-                torsional_friction: Option<f64>,
-                tangential_restitution: Option<f64>,
-                adhesion: Option<f64>,
-                surface_velocity: Option<&Bound<'_, PyAny>>,
+                surface: Option<&Bound<'_, PyDict>>,
             ) -> Result<()> {
-                let numbers = [
-                    friction,
-                    restitution,
-                    static_friction,
-                    stribeck_speed,
-                    rolling_friction,
-                    torsional_friction,
-                    tangential_restitution,
-                    adhesion,
-                ];
-                let given = Given::new(numbers, friction_scale, surface_velocity)?;
+                let given = Given::of_words("set_shape_material", surface)?;
                 let set: fn(&$class, Python<'_>, Given, $($kind),+) -> Result<()> = $set;
                 set(self, py, given, $($place),+)
             }
@@ -147,6 +150,8 @@ macro_rules! set_shape_material {
 set_shape_material!(
     RigidBody,
     (shape: Which),
+    "($self, shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None, \
+     rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None)",
     |body, py, given, shape| {
         let shape = body.numbered(shape)?;
         body.change(py, |body| body.set_shape_material(shape, given.over(body.shape_material(shape))))
@@ -160,6 +165,8 @@ set_shape_material!(
 set_shape_material!(
     Articulation,
     (link: &str, shape: Which),
+    "($self, link, shape, *, friction=None, restitution=None, static_friction=None, stribeck_speed=None, friction_scale=None, \
+     rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None)",
     |articulation, py, given, link, shape| {
         let (place, (part, shape)) = (articulation.in_world()?, articulation.of_link(link, shape)?);
         place.write(py, |inner| {

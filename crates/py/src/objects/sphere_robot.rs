@@ -1,6 +1,7 @@
 //! Robots whose links are covered by spheres, for motion planners.
 
-use crate::arrays::convert::{path, whole_number};
+use crate::arrays::convert::path;
+use crate::arrays::whole;
 use crate::choices::{BUILDERS, MISSING_MESHES, meaning};
 use crate::errors::{Error, Result};
 use crate::interrupt::abandonable;
@@ -69,8 +70,8 @@ impl SphereRobot {
     fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
-        #[pyo3(from_py_with = whole_number)] spheres: Option<u32>,
-        spheres_of: Option<BTreeMap<String, usize>>,
+        #[pyo3(from_py_with = whole::spheres)] spheres: Option<u32>,
+        #[pyo3(from_py_with = whole::spheres_of)] spheres_of: Option<BTreeMap<String, usize>>,
         coverage: Option<f64>,
         coverage_of: Option<BTreeMap<String, f64>>,
         weight: Option<f64>,
@@ -164,7 +165,7 @@ impl SphereRobot {
         &self,
         py: Python<'_>,
         poses: Option<Vec<JointPositions>>,
-        sample_poses: usize,
+        #[pyo3(from_py_with = whole::sample_poses)] sample_poses: usize,
     ) -> Result<Vec<(String, String)>> {
         let free = poses.unwrap_or_default();
         let found = py.detach(|| self.robot.ignored_pairs(&free, &self.robot.sample_poses(sample_poses, 0)));

@@ -1,7 +1,8 @@
 //! Sphere trees: built, measured, written and read. The library computes the trees and all their
 //! metrics.
 
-use crate::arrays::convert::{path, whole_number};
+use crate::arrays::convert::path;
+use crate::arrays::whole;
 use crate::choices::{BUILDERS, meaning, word};
 use crate::errors::{Error, Result, caught};
 use crate::interrupt::abandonable;
@@ -121,8 +122,8 @@ impl SphereTree {
         vertices: &Bound<'_, PyAny>,
         faces: Option<&Bound<'_, PyAny>>,
         method: &str,
-        #[pyo3(from_py_with = whole_number)] branching: Option<u32>,
-        #[pyo3(from_py_with = whole_number)] depth: Option<u32>,
+        #[pyo3(from_py_with = whole::branching)] branching: Option<u32>,
+        #[pyo3(from_py_with = whole::depth)] depth: Option<u32>,
         max_error: Option<f64>,
         cache: bool,
     ) -> Result<SphereTree> {

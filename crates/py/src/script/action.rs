@@ -1,6 +1,7 @@
 //! Actions of events in Python.
 
-use crate::arrays::convert::{Numbers, numbers, pose, some, unit, vec3, vec3_or, whole_number};
+use crate::arrays::convert::{Numbers, numbers, pose, some, unit, vec3, vec3_or};
+use crate::arrays::whole;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::script::{Given, part_of};
@@ -164,7 +165,7 @@ impl Action {
     /// ``Joint.dofs``; of a spherical joint a component of its rotation vector.
     #[staticmethod]
     #[pyo3(signature = (joint, target, *, dof=0))]
-    fn drive(joint: Given, target: f64, #[pyo3(from_py_with = whole_number)] dof: usize) -> Action {
+    fn drive(joint: Given, target: f64, #[pyo3(from_py_with = whole::dof)] dof: usize) -> Action {
         Action { deed: Deed::Drive { body: joint, dof, target, original: None } }
     }
 
@@ -191,7 +192,7 @@ impl Action {
     #[staticmethod]
     #[pyo3(signature = (number, *, intensity=None, color=None))]
     fn light(
-        #[pyo3(from_py_with = whole_number)] number: usize,
+        #[pyo3(from_py_with = whole::number)] number: usize,
         intensity: Option<f64>,
         color: Option<&Bound<'_, PyAny>>,
     ) -> Result<Action> {

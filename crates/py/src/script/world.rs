@@ -1,6 +1,6 @@
 //! The methods of `World` that add events and templates, and press keys.
 
-use crate::arrays::convert::whole_number;
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::objects::appearance::looking;
 use crate::objects::place::Place;
@@ -31,7 +31,7 @@ impl World {
         when: &Bound<'_, Trigger>,
         r#do: &Bound<'_, PyAny>,
         delay: f64,
-        #[pyo3(from_py_with = whole_number)] times: Option<u32>,
+        #[pyo3(from_py_with = whole::times)] times: Option<u32>,
     ) -> Result<ScriptedEvent> {
         let given: Vec<Bound<'_, PyAny>> = match r#do.cast::<PyList>() {
             Ok(list) => list.iter().collect(),
@@ -69,7 +69,7 @@ impl World {
         py: Python<'_>,
         name: &str,
         shape: PyRef<'_, Shape>,
-        #[pyo3(from_py_with = whole_number)] max: usize,
+        #[pyo3(from_py_with = whole::max)] max: usize,
         mass: Option<f64>,
         density: Option<f64>,
         restitution: f64,

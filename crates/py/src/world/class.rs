@@ -8,7 +8,8 @@ mod queries;
 mod saving;
 mod settings;
 
-use crate::arrays::convert::{path, vec3_or, whole_number};
+use crate::arrays::convert::{path, vec3_or};
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::io::slow;
 use crate::objects::place::body_ids;
@@ -97,24 +98,24 @@ impl World {
         stepper: &str,
         integrator: &str,
         solver: &str,
-        #[pyo3(from_py_with = whole_number)] substeps: u32,
-        #[pyo3(from_py_with = whole_number)] iterations: u32,
+        #[pyo3(from_py_with = whole::substeps)] substeps: u32,
+        #[pyo3(from_py_with = whole::iterations)] iterations: u32,
         contact_tolerance: f64,
         integrator_tolerance: f64,
         sleep_after: Option<f64>,
         sleep_within: f64,
         combine_restitution: &str,
         combine_friction: &str,
-        #[pyo3(from_py_with = whole_number)] threads: u32,
-        budget: Option<u32>,
+        #[pyo3(from_py_with = whole::threads)] threads: u32,
+        #[pyo3(from_py_with = whole::budget)] budget: Option<u32>,
         event_impulse: f64,
         max_turn: f64,
         drift_tolerance: Option<f64>,
         recovery_speed: f64,
-        #[pyo3(from_py_with = whole_number)] projection_sweeps: u32,
+        #[pyo3(from_py_with = whole::projection_sweeps)] projection_sweeps: u32,
         stabilize_positions: bool,
         solver_tolerance: f64,
-        #[pyo3(from_py_with = whole_number)] max_relaxations: u32,
+        #[pyo3(from_py_with = whole::max_relaxations)] max_relaxations: u32,
     ) -> Result<World> {
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
@@ -150,8 +151,8 @@ impl World {
         stepper: Option<&str>,
         integrator: Option<&str>,
         solver: Option<&str>,
-        threads: Option<u32>,
-        budget: Option<u32>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<u32>,
+        #[pyo3(from_py_with = whole::budget)] budget: Option<u32>,
         keyframe: Option<String>,
     ) -> Result<World> {
         let asked = path(path_or_name)?;
@@ -192,7 +193,7 @@ impl World {
     ///
     /// After a ``StepError`` the world is as before the step that failed; earlier steps are kept.
     #[pyo3(signature = (n=1))]
-    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] n: i64) -> Result<()> {
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole::n)] n: i64) -> Result<()> {
         let Ok(mut left) = u64::try_from(n) else {
             return Err(Error::value(format!("n is {n}; it must be at least 0")));
         };

@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{Numbers, number, numbers, pose, shown, vec3};
 use crate::errors::{Error, Result};
+use crate::objects::link::Link;
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
 use crate::world::add::own_place;
@@ -121,7 +122,7 @@ fn without(filter: QueryFilter, (id, parts): (ObjectId, Option<Vec<usize>>)) -> 
     }
 }
 
-/// Converts a body, or a link: ``"ARTICULATION/LINK"`` or (articulation, link), with the parts that are its shapes.
+/// Converts a body, or a link: a handle, ``"ARTICULATION/LINK"`` or (articulation, link), with the parts that are its shapes.
 fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Option<Vec<usize>>)> {
     let of_link = |id: ObjectId, link: &str| {
         let parts = shared.read(|inner| {
@@ -132,6 +133,9 @@ fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Op
         })?;
         Ok((id, Some(parts)))
     };
+    if let Ok(link) = value.cast::<Link>() {
+        return of_link(own_place(shared, link.get().articulation().bind(value.py()).as_any())?.id, link.get().name());
+    }
     if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
         return match own_place(shared, &body)? {
             place if shared.read(|inner| Ok(inner.world.get::<ArticulatedBody>(place.id).is_some()))? => {
@@ -159,7 +163,8 @@ pub fn group(number: u8) -> Result<CollisionGroup> {
 pub fn mask(value: Option<&Bound<'_, PyAny>>) -> Result<u64> {
     let Some(value) = value else { return Ok(u64::MAX) };
     if value.is_instance_of::<PyInt>() {
-        return value.extract::<u64>().map_err(|_| Error::value("mask: expected an integer of at most 64 bits"));
+        let wrong = "expected the bits of an integer from 0 to 2**64 - 1, a sequence of groups, or None for all";
+        return value.extract::<u64>().map_err(|_| Error::value(format!("mask is {value}; {wrong}")));
     }
     let wrong = |_| Error::value("mask: expected the bits of an integer, or a sequence of groups from 0 to 63");
     let groups: Vec<u8> = value.extract().map_err(wrong)?;
@@ -362,9 +367,13 @@ pub fn closest_points<'py>(
         Ok(shape) => {
             let (at, mut filter) = (placed(&shape, pose(position, orientation)?), selection.filter(shared)?);
             if let Some(b) = b {
-                let only = own_place(shared, b)?.id;
+                let (only, parts) = named(shared, b)?;
                 shared.read(|inner| {
                     filter.ignored.extend(inner.world.ids().iter().filter(|&&id| id != only));
+                    let body = inner.world.get::<ArticulatedBody>(only).filter(|_| parts.is_some());
+                    let others = body.map_or(0..0, |body| 0..body.model().links().len() + 1 + body.colliders().count());
+                    filter = std::mem::take(&mut filter)
+                        .ignoring_parts(only, others.filter(|part| !parts.iter().flatten().any(|own| own == part)));
                     Ok(())
                 })?;
             }
@@ -375,8 +384,10 @@ pub fn closest_points<'py>(
             if position.is_some() || orientation.is_some() {
                 return Err(Error::value("closest_points: position and orientation are those of a shape; a is a body"));
             }
-            let (a, b) = (own_place(shared, a)?.id, own_place(shared, b)?.id);
-            shared.read(|inner| row(inner, inner.world.closest_points(a, b)?))?
+            let ((a, parts_a), (b, parts_b)) = (named(shared, a)?, named(shared, b)?);
+            shared.read(|inner| {
+                row(inner, inner.world.closest_points_of((a, parts_a.as_deref()), (b, parts_b.as_deref()))?)
+            })?
         }
     };
     rows.first(py)

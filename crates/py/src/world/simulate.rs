@@ -1,6 +1,7 @@
 //! `simulate`: from bytes and controls to arrays, without a handle that stays.
 
-use crate::arrays::convert::{Numbers, numbers, room, shown, whole_number};
+use crate::arrays::convert::{Numbers, numbers, room, shown};
+use crate::arrays::whole;
 use crate::batch::fields::{Field, Layout};
 use crate::batch::member::write;
 use crate::errors::{Error, Result};
@@ -51,7 +52,7 @@ pub fn simulate<'py>(
     model: PyBackedBytes,
     snapshot: Option<PyBackedBytes>,
     controls: &Bound<'py, PyAny>,
-    #[pyo3(from_py_with = whole_number)] every: usize,
+    #[pyo3(from_py_with = whole::every)] every: usize,
 ) -> Result<Bound<'py, PyDict>> {
     let controls = numbers(controls, "controls")?;
     let course = interruptible(py, |stop| run(&model, snapshot.as_deref(), &controls, every, stop))?;

@@ -255,6 +255,23 @@ fn quality_says_how_much_of_an_object_is_drawn() {
             .to_string()
             .contains("expected full, simplified, wireframe or sphere_tree=LEVEL")
     );
+    for detail in ["sphere_tree=99", "sphere_tree=64", "sphere_tree=-1", "sphere_tree="] {
+        let why = SceneFile::parse(&CARRIER.replace("wireframe", detail), "s.toml").unwrap_err().to_string();
+        assert!(why.contains(detail) && why.contains("sphere_tree=LEVEL, LEVEL from 0 to 63"), "{why}");
+    }
+    assert!("sphere_tree=63".parse::<tumble_core::Detail>().is_ok());
+}
+
+/// The checksum of a chunk of a PNG.
+fn crc(bytes: &[u8]) -> u32 {
+    let mut sum = u32::MAX;
+    for byte in bytes {
+        sum ^= u32::from(*byte);
+        for _ in 0..8 {
+            sum = (sum >> 1) ^ if sum & 1 == 1 { 0xEDB8_8320 } else { 0 };
+        }
+    }
+    !sum
 }
 
 #[test]
@@ -275,6 +292,21 @@ fn a_texture_is_listed_once_and_a_missing_one_is_reported_with_its_line() {
     list.validate().unwrap();
     let missing = SceneFile::parse(&text.replace("t.png", "u.png"), &name).unwrap_err().to_string();
     assert!(missing.contains("s.toml:2:") && missing.contains("expected a PNG file; there is none at"), "{missing}");
+    // a file that is no PNG, one that is cut off, and one that is too large are refused before anything is drawn
+    let whole = std::fs::read(folder.join("t.png")).unwrap();
+    let mut large = whole.clone();
+    large[16..20].copy_from_slice(&9000u32.to_be_bytes());
+    let sum = crc(&large[12..29]).to_be_bytes();
+    large[29..33].copy_from_slice(&sum);
+    for (bytes, why) in [
+        (&b"bark"[..], "t.png: the texture is no PNG: "),
+        (&whole[..whole.len() - 6], "t.png: the texture is damaged: it has no end"),
+        (&large, "t.png: the texture is 9000 x 1 pixels, and each side may have 8192"),
+    ] {
+        std::fs::write(folder.join("t.png"), bytes).unwrap();
+        let wrong = SceneFile::parse(text, &name).unwrap_err().to_string();
+        assert!(wrong.contains("s.toml:2:11:") && wrong.contains(why), "{wrong}");
+    }
     std::fs::remove_dir_all(&folder).unwrap();
 }
 

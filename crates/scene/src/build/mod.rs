@@ -14,5 +14,6 @@ mod mimic;
 mod sensor;
 pub(crate) mod shapes;
 pub(crate) mod slow;
+pub(crate) mod textures;
 pub(crate) mod visual_mesh;
 pub(crate) mod world;

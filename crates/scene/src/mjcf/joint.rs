@@ -87,7 +87,8 @@ impl<'a> JointItem<'a> {
         };
         // MuJoCo bounds the whole rotation: that is at least the swing and at least the twist
         let ball_range = (limited && !single && reader.limits).then(|| read_range(&item, "range")).flatten();
-        let ball_range = ball_range.map(|[_, most]| reader.compiler.angle(most));
+        // no rotation is above π
+        let ball_range = ball_range.map(|[_, most]| reader.compiler.angle(most).min(std::f64::consts::PI));
         if ball_range.is_some() {
             reader
                 .notes

@@ -1,5 +1,6 @@
 //! The appearance of a surface: colors, pattern, gloss. It has no effect on motion.
 
+use crate::build::textures::check_texture;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Names, Value};
 use std::path::PathBuf;
@@ -129,12 +130,14 @@ impl AppearanceSpec {
     }
 }
 
-/// Reads the file of a texture, which must exist.
+/// Reads the file of a texture, which must be a PNG.
 fn read_texture(f: &mut Fields<'_>) -> Option<PathBuf> {
     let (file, value) = f.optional_text("texture")?;
     let path = f.log.folder().join(file);
     if !path.is_file() {
         f.wrong("texture", value, format!("a PNG file; there is none at {}", path.display()));
+    } else if let Err(why) = check_texture(&path) {
+        f.wrong("texture", value, format!("a PNG file; {}: {why}", path.display()));
     }
     Some(path)
 }

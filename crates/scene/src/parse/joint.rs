@@ -82,7 +82,7 @@ const DRIVE_KINDS: Names<DriveKind> =
     &[("position", DriveKind::Position), ("velocity", DriveKind::Velocity), ("playback", DriveKind::Playback)];
 
 /// A key in SI units, and for angles the key in degrees.
-type Key = (&'static str, Option<&'static str>);
+pub(crate) type Key = (&'static str, Option<&'static str>);
 
 /// The keys of a joint with one degree of freedom.
 struct JointKeys {
@@ -195,7 +195,7 @@ impl JointSpec {
         let keys = self.keys();
         match self.kind {
             Joint::Spherical => {
-                self.read_settings(f, true);
+                self.read_settings(f, true, true);
                 self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
                 self.read_swing_and_twist(f);
                 self.read_spherical_start(f);
@@ -207,7 +207,7 @@ impl JointSpec {
                 }
                 self.velocity[0] = f.number_or(keys.rate, Bound::ANY, self.velocity[0]);
                 self.armature = f.number_or(keys.armature, Bound::NOT_NEGATIVE, self.armature);
-                self.read_settings(f, true);
+                self.read_settings(f, true, false);
             }
             _ if self.kind.dof() > 0 => self.read_resistance(f, keys),
             _ => {}
@@ -215,18 +215,37 @@ impl JointSpec {
     }
 
     fn read_resistance(&mut self, f: &mut Fields<'_>, keys: &'static JointKeys) {
-        self.dof.damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, self.dof.damping);
-        self.dof.friction = f.number_or(keys.friction, Bound::NOT_NEGATIVE, self.dof.friction);
-        self.dof.max_velocity = f.number_or(keys.max_velocity, Bound::POSITIVE, self.dof.max_velocity);
+        if let Some(damping) = f.optional_number(keys.damping, Bound::NOT_NEGATIVE) {
+            self.each(|_, dof| dof.damping = damping);
+        }
+        if let Some(friction) = f.optional_number(keys.friction, Bound::NOT_NEGATIVE) {
+            self.each(|_, dof| dof.friction = friction);
+        }
+        if let Some(most) = f.optional_number(keys.max_velocity, Bound::POSITIVE) {
+            self.each(|_, dof| dof.max_velocity = most);
+        }
+    }
+
+    /// Changes the settings of each degree of freedom, by its number.
+    fn each(&mut self, change: impl Fn(usize, &mut DofSettings)) {
+        change(0, &mut self.dof);
+        self.dofs.iter_mut().enumerate().for_each(|(k, dof)| change(k, dof));
+    }
+
+    /// Gives each degree of freedom settings of its own if the components of a vector differ.
+    fn part_by(&mut self, [x, y, z]: [f64; 3]) {
+        if self.dofs.is_empty() && (x != y || x != z) {
+            self.dofs = vec![self.dof.clone(); 3];
+        }
     }
 
     /// Reads the settings of a degree of freedom of a loop joint: its spring if `springs`, its armature unless it is a
-    /// length. Keys that are absent change nothing.
-    pub(crate) fn read_loop_dof(&mut self, f: &mut Fields<'_>, springs: bool, length: bool) {
+    /// length. With `vectors` they are those of all axes of a spherical joint. Keys that are absent change nothing.
+    pub(crate) fn read_loop_dof(&mut self, f: &mut Fields<'_>, springs: bool, length: bool, vectors: bool) {
         if !length {
             self.armature = f.number_or(self.keys().armature, Bound::NOT_NEGATIVE, self.armature);
         }
-        self.read_settings(f, springs);
+        self.read_settings(f, springs, vectors);
     }
 
     /// Returns the settings of each of its degrees of freedom.
@@ -235,7 +254,7 @@ impl JointSpec {
             let own = self.dofs.get(k).unwrap_or(&self.dof);
             let cone = self.cone.filter(|(axis, _)| *axis == k).map(|(_, cone)| [0.0, cone]);
             let twist_limits = self.twist_limits.filter(|(axis, _)| *axis == k).map(|(_, limits)| limits);
-            DofSettings { limits: own.limits.or(cone), twist_limits, ..own.clone() }
+            DofSettings { limits: own.limits.or(cone), twist_limits: own.twist_limits.or(twist_limits), ..own.clone() }
         };
         (0..self.kind.dof()).map(of).collect()
     }
@@ -250,31 +269,36 @@ impl JointSpec {
     }
 
     /// Reads the settings of a joint with one degree of freedom, or those of a degree of freedom of a spherical one without limits;
-    /// its spring if `springs`. Keys that are absent change nothing.
-    pub(crate) fn read_settings(&mut self, f: &mut Fields<'_>, springs: bool) {
+    /// its spring if `springs`. With `vectors` they are those of all axes of a spherical joint, and rest positions and targets may have
+    /// one number for each. Keys that are absent change nothing.
+    pub(crate) fn read_settings(&mut self, f: &mut Fields<'_>, springs: bool, vectors: bool) {
         let keys = self.keys();
         self.read_resistance(f, keys);
         if let Some(limits) = self.is_single().then(|| read_limits(f, keys.limits)).flatten() {
             self.dof.limits = limits;
         }
-        self.dof.effort = f.number_or(keys.effort, Bound::POSITIVE, self.dof.effort);
+        if let Some(effort) = f.optional_number(keys.effort, Bound::POSITIVE) {
+            self.each(|_, dof| dof.effort = effort);
+        }
         let example = format!("{{ {} = 10 }}", keys.stiffness);
         if let Some(mut spring) = springs.then(|| f.table("spring", &example)).flatten() {
             let stiffness = spring.number(keys.stiffness, Bound::NOT_NEGATIVE);
-            let rest = number(&mut spring, keys.rest).unwrap_or(0.0);
+            let rest = components(&mut spring, keys.rest, vectors).unwrap_or([0.0; 3]);
             spring.finish();
-            self.dof.spring = Some(Spring { stiffness, rest });
+            self.part_by(rest);
+            self.each(|k, dof| dof.spring = Some(Spring { stiffness, rest: rest[k] }));
         }
         if let Some(drive) = f.table("drive", &format!("{{ type = \"position\", {} = 100 }}", keys.stiffness)) {
-            self.read_drive(drive, keys);
+            self.read_drive(drive, keys, vectors);
         }
     }
 
-    fn read_drive(&mut self, mut f: Fields<'_>, keys: &'static JointKeys) {
+    fn read_drive(&mut self, mut f: Fields<'_>, keys: &'static JointKeys, vectors: bool) {
         let Some(motor) = f.choice("type", DRIVE_KINDS) else { return f.give_up() };
         let most = self.dof.effort;
         self.holds_start = false;
-        let drive = match motor {
+        self.dofs_hold_start.clear();
+        match motor {
             DriveKind::Position => {
                 let stiffness = f.number_or(keys.stiffness, Bound::NOT_NEGATIVE, 0.0);
                 let damping = f.number_or(keys.damping, Bound::NOT_NEGATIVE, 0.0);
@@ -286,28 +310,36 @@ impl JointSpec {
                         format!("expected `{}` or `{}` greater than 0", keys.stiffness, keys.damping),
                     );
                 }
-                let target = number(&mut f, keys.target);
+                let target = components(&mut f, keys.target, vectors);
                 self.holds_start = target.is_none();
-                let velocity = f.number_or(keys.target_rate, Bound::ANY, 0.0);
-                Some(Drive::Position {
-                    stiffness,
-                    damping,
-                    target: target.unwrap_or(0.0),
-                    velocity,
-                    limit: read_most(&mut f, keys.limit, most),
-                })
+                let target = target.unwrap_or([0.0; 3]);
+                let velocity = components(&mut f, (keys.target_rate, None), vectors).unwrap_or([0.0; 3]);
+                let limit = read_most(&mut f, keys.limit, most);
+                self.part_by(target);
+                self.part_by(velocity);
+                self.each(|k, dof| {
+                    let (target, velocity) = (target[k], velocity[k]);
+                    dof.drive = Drive::Position { stiffness, damping, target, velocity, limit };
+                });
             }
             DriveKind::Velocity => {
-                let target = f.number(keys.target_rate, Bound::ANY);
-                Some(Drive::Velocity { target, limit: read_most(&mut f, keys.limit, most) })
+                let target = match components(&mut f, (keys.target_rate, None), vectors) {
+                    Some(target) => target,
+                    None => [f.number(keys.target_rate, Bound::ANY); 3],
+                };
+                let limit = read_most(&mut f, keys.limit, most);
+                self.part_by(target);
+                self.each(|k, dof| dof.drive = Drive::Velocity { target: target[k], limit });
             }
             DriveKind::Playback => {
                 let limit = read_most(&mut f, keys.limit, most);
-                read_playback(&mut f, keys.values).map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
+                let drive = read_playback(&mut f, keys.values)
+                    .map(|motion| Drive::Playback { motion: Arc::new(motion), limit })
+                    .unwrap_or_default();
+                self.each(|_, dof| dof.drive = drive.clone());
             }
-        };
+        }
         f.finish();
-        self.dof.drive = drive.unwrap_or_default();
     }
 
     /// Reads `mimic`. Returns the name of the joint to follow and its place in the file; the index
@@ -347,6 +379,20 @@ impl JointSpec {
 pub(crate) fn number(f: &mut Fields<'_>, (si, degrees): Key) -> Option<f64> {
     let given = f.optional_number(si, Bound::ANY);
     let turned = degrees.and_then(|key| f.optional_number(key, Bound::ANY)).map(f64::to_radians);
+    one_of(f, (si, degrees), given, turned)
+}
+
+/// Reads one number for all axes or, of a spherical joint as a whole, one for each: in SI units or degrees, if either key is present.
+fn components(f: &mut Fields<'_>, (si, degrees): Key, vectors: bool) -> Option<[f64; 3]> {
+    let read = |f: &mut Fields<'_>, key: &'static str| {
+        let value = f.value(key)?;
+        Some(match vectors && value.get_ref().is_array() {
+            true => f.as_vector(key, value, Bound::ANY),
+            false => [f.as_number(key, value, Bound::ANY); 3],
+        })
+    };
+    let given = read(f, si);
+    let turned = degrees.and_then(|key| read(f, key)).map(|angles| angles.map(f64::to_radians));
     one_of(f, (si, degrees), given, turned)
 }
 

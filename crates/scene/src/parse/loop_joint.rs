@@ -4,7 +4,7 @@ use tumble_core::articulated::{DofSettings, Spring};
 use tumble_core::collide::{Pose, Vec3};
 use tumble_core::{Joint, LoopJointKind};
 
-use crate::parse::ball_joint::check_twist;
+use crate::parse::ball_joint::{TWIST, check_twist, read_cone};
 use crate::parse::body::read_name;
 use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
@@ -155,7 +155,11 @@ impl LoopJointSpec {
             _ if !placed => None,
             LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
             LoopJointKind::Planar | LoopJointKind::Spherical => {
-                f.optional_vector::<3>("second_axis", Bound::ANY).filter(|x| x.iter().any(|x| *x != 0.0))
+                let x = f.optional_vector::<3>("second_axis", Bound::ANY);
+                if let (Some(true), Some(value)) = (x.map(|x| x == [0.0; 3]), f.value("second_axis")) {
+                    f.wrong("second_axis", value, "a direction: a vector that is not zero");
+                }
+                x
             }
             LoopJointKind::Gear => Some(f.direction_or("second_axis", axis)),
             _ => None,
@@ -173,12 +177,8 @@ impl LoopJointSpec {
             false => None,
         };
         let spherical = kind == LoopJointKind::Spherical;
-        let cone_rad = spherical.then(|| number(&mut f, ("cone_rad", Some("cone_deg")))).flatten();
-        let key = if f.value("cone_rad").is_some() { "cone_rad" } else { "cone_deg" };
-        if let (Some(..0.0), Some(value)) = (cone_rad, f.value(key)) {
-            f.wrong(key, value, "a number that is at least 0");
-        }
-        let twist = spherical.then(|| read_limits(&mut f, ("twist_limits_rad", Some("twist_limits_deg"))));
+        let cone_rad = spherical.then(|| read_cone(&mut f)).flatten();
+        let twist = spherical.then(|| read_limits(&mut f, TWIST));
         let twist_limits_rad = twist.flatten().flatten();
         if spherical {
             check_twist(&mut f);
@@ -283,18 +283,19 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
     let springs = kind != LoopJointKind::Spring;
     match joints.first_mut() {
         Some(first) => {
-            first.read_loop_dof(f, springs, kind.has_length());
+            first.read_loop_dof(f, springs, kind.has_length(), spherical);
             check_angle(f, kind, 0);
         }
         None => refuse_settings(f, kind),
     }
     if spherical {
         let first = joints[0].clone();
-        joints.fill(first);
+        let own = |k: usize| first.dofs.get(k).unwrap_or(&first.dof).clone();
+        joints = (0..count).map(|k| JointSpec { dof: own(k), dofs: Vec::new(), ..first.clone() }).collect();
     }
     let tables = if count > 1 { f.tables("dof", count) } else { Vec::new() };
     for ((k, joint), mut table) in joints.iter_mut().enumerate().zip(tables) {
-        joint.read_loop_dof(&mut table, springs, kind.has_length());
+        joint.read_loop_dof(&mut table, springs, kind.has_length(), false);
         check_angle(&mut table, kind, k);
         table.finish();
     }

@@ -95,9 +95,6 @@ impl Writer<'_> {
             self.fault(format!("link \"{name}\": different damping or friction of one joint's degrees of freedom"));
         }
         let axes: BTreeSet<usize> = cones.iter().map(|(k, _)| *k).chain(twists.iter().map(|(k, _)| *k)).collect();
-        if axes.len() > 1 {
-            self.fault(format!("link \"{name}\": cones or limits of the twist about several axes of one joint"));
-        }
         match kind {
             Joint::Fixed | Joint::Floating => {}
             Joint::Revolute { axis } | Joint::Prismatic { axis } => {
@@ -127,14 +124,31 @@ impl Writer<'_> {
                 t.extend(rotation(&state[*q..q + 4]));
                 t.put("angular_velocity_rad_per_s", rates);
                 t.put_unless(0.0, "armature_kg_m2", *armature);
-                for axis in axes {
-                    t.put("axis", [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 }));
+                let several = axes.len() > 1;
+                if let (false, Some(axis)) = (several, axes.first()) {
+                    t.put("axis", [0, 1, 2].map(|k| if k == *axis { 1.0 } else { 0.0 }));
+                    cones.iter().for_each(|(_, cone)| t.put("cone_rad", *cone));
+                    twists.iter().for_each(|(_, limits)| t.put("twist_limits_rad", *limits));
                 }
-                cones.iter().for_each(|(_, cone)| t.put("cone_rad", *cone));
-                twists.iter().for_each(|(_, limits)| t.put("twist_limits_rad", *limits));
-                match alike {
-                    true => t.extend(dof_settings(&free(dof), true)),
-                    false => t.put("dof", own.iter().map(|dof| dof_settings(&free(dof), true)).collect::<Vec<Table>>()),
+                let free: Vec<DofSettings> = own.iter().map(free).collect();
+                match spherical_settings(&free.iter().collect::<Vec<_>>()).filter(|_| !several) {
+                    Some(settings) => t.extend(settings),
+                    None => t.put(
+                        "dof",
+                        (0..own.len())
+                            .map(|k| {
+                                let mut table = dof_settings(&free[k], true);
+                                if several {
+                                    own[k].limits.iter().for_each(|[_, cone]| table.put("cone_rad", *cone));
+                                    own[k]
+                                        .twist_limits
+                                        .iter()
+                                        .for_each(|limits| table.put("twist_limits_rad", *limits));
+                                }
+                                table
+                            })
+                            .collect::<Vec<Table>>(),
+                    ),
                 }
             }
         }
@@ -290,10 +304,32 @@ fn resistance(dof: &DofSettings) -> Table {
     t
 }
 
-/// Returns the settings of a degree of freedom with a position; `turns` for an angle.
+/// Returns the settings of all axes of a spherical joint as one table, in which rest positions and targets are vectors if they differ.
+/// `None` if the axes differ in more.
+pub(super) fn spherical_settings(dofs: &[&DofSettings]) -> Option<Table> {
+    let level = |dof: &DofSettings| {
+        let mut dof = dof.clone();
+        dof.spring.iter_mut().for_each(|spring| spring.rest = 0.0);
+        match &mut dof.drive {
+            Drive::Position { target, velocity, .. } => [*target, *velocity] = [0.0; 2],
+            Drive::Velocity { target, .. } => *target = 0.0,
+            Drive::None | Drive::Playback { .. } => {}
+        }
+        dof
+    };
+    let first = level(dofs.first()?);
+    dofs.iter().all(|dof| level(dof) == first).then(|| settings_of(dofs, true))
+}
+
+/// Returns the settings of one degree of freedom.
 pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
+    settings_of(&[dof], turns)
+}
+
+/// Returns the settings of degrees of freedom that differ in rest positions and targets alone.
+fn settings_of(dofs: &[&DofSettings], turns: bool) -> Table {
     // the limits of a twist stand beside the axis of their joint
-    let DofSettings { limits, twist_limits: _, damping, friction, spring, drive, max_velocity, effort } = dof;
+    let DofSettings { limits, twist_limits: _, damping, friction, spring, drive, max_velocity, effort } = dofs[0];
     let [at_limits, resists, dry, stiff, at_rest] = match turns {
         true => ["limits_rad", "damping_n_m_s_per_rad", "friction_n_m", "stiffness_n_m_per_rad", "rest_rad"],
         false => ["limits_m", "damping_n_s_per_m", "friction_n", "stiffness_n_per_m", "rest_m"],
@@ -306,6 +342,7 @@ pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
         true => ["target_rad", "target_rad_per_s", "max_torque_n_m", "values_rad"],
         false => ["target_m", "target_m_per_s", "max_force_n", "values_m"],
     };
+    let of_drive = |number: fn(&Drive) -> f64| -> Vec<f64> { dofs.iter().map(|dof| number(&dof.drive)).collect() };
     let mut t = Table::default();
     limits.iter().for_each(|limits| t.put(at_limits, *limits));
     t.put_unless(0.0, resists, *damping);
@@ -314,22 +351,37 @@ pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
     t.put_unless(f64::INFINITY, strongest, *effort);
     if let Some(spring) = spring {
         let mut s = Table::of(stiff, spring.stiffness);
-        s.put(at_rest, spring.rest);
+        put_components(
+            &mut s,
+            at_rest,
+            &dofs.iter().map(|dof| dof.spring.map_or(0.0, |spring| spring.rest)).collect::<Vec<_>>(),
+        );
         t.put("spring", s);
     }
     let (mut d, limit) = match drive {
         Drive::None => return t,
-        Drive::Position { stiffness, damping, target: to, velocity, limit } => {
+        Drive::Position { stiffness, damping, limit, .. } => {
             let mut d = Table::of("type", "position");
             d.put_unless(0.0, stiff, *stiffness);
             d.put_unless(0.0, resists, *damping);
-            d.put(target, *to);
-            d.put_unless(0.0, rate, *velocity);
+            put_components(
+                &mut d,
+                target,
+                &of_drive(|drive| if let Drive::Position { target, .. } = drive { *target } else { 0.0 }),
+            );
+            let rates = of_drive(|drive| if let Drive::Position { velocity, .. } = drive { *velocity } else { 0.0 });
+            if rates.iter().any(|rate| *rate != 0.0) {
+                put_components(&mut d, rate, &rates);
+            }
             (d, limit)
         }
-        Drive::Velocity { target: to, limit } => {
+        Drive::Velocity { limit, .. } => {
             let mut d = Table::of("type", "velocity");
-            d.put(rate, *to);
+            put_components(
+                &mut d,
+                rate,
+                &of_drive(|drive| if let Drive::Velocity { target, .. } = drive { *target } else { 0.0 }),
+            );
             (d, limit)
         }
         Drive::Playback { motion, limit } => {
@@ -347,6 +399,14 @@ pub(super) fn dof_settings(dof: &DofSettings, turns: bool) -> Table {
     }
     t.put("drive", d);
     t
+}
+
+/// Writes one number if all are the same, otherwise a vector.
+fn put_components(t: &mut Table, key: &'static str, components: &[f64]) {
+    match components.iter().all(|x| x.to_bits() == components[0].to_bits()) {
+        true => t.put(key, components[0]),
+        false => t.put(key, components),
+    }
 }
 
 fn pose_of(q: &[f64]) -> Pose {

@@ -5,12 +5,12 @@ use std::f64::consts::PI;
 
 use tumble_core::collide::Pose;
 use tumble_core::{
-    Anchor, ArticulatedBody, Joint, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, PairMaterial, PairSide,
-    Transmission,
+    Anchor, ArticulatedBody, DofSettings, Joint, JointRef, LoopJoint, LoopJointKind, Mimic, ObjectId, PairMaterial,
+    PairSide, Transmission,
 };
 
 use super::Writer;
-use super::articulated::dof_settings;
+use super::articulated::{dof_settings, spherical_settings};
 use super::text::Table;
 
 impl Writer<'_> {
@@ -52,9 +52,16 @@ impl Writer<'_> {
         joint.twist_limits().iter().for_each(|limits| t.put("twist_limits_rad", *limits));
         let mut dofs: Vec<Table> = (0..kind.dofs()).map(|k| loop_dof(joint, k)).collect();
         while dofs.pop_if(|last| last.is_empty()).is_some() {}
-        match kind.dofs() {
-            1 => dofs.into_iter().for_each(|dof| t.extend(dof)),
+        let all: Vec<&DofSettings> = (0..kind.dofs()).filter_map(|k| joint.dof_at(k)).collect();
+        let same = (0..kind.dofs()).all(|k| joint.armature_at(k) == joint.armature_at(0));
+        let whole = (kind == LoopJointKind::Spherical && same).then(|| spherical_settings(&all)).flatten();
+        match (kind.dofs(), whole) {
+            (1, _) => dofs.into_iter().for_each(|dof| t.extend(dof)),
             _ if dofs.is_empty() => {}
+            (_, Some(whole)) => {
+                t.put_unless(0.0, "armature_kg_m2", joint.armature_at(0).unwrap_or(0.0));
+                t.extend(whole);
+            }
             _ => t.put("dof", dofs),
         }
         if let Some(angle) = self.turned(id, joint) {

@@ -219,11 +219,98 @@ fn a_joint_begins_in_the_turn_of_its_angle() {
 }
 
 #[test]
-fn a_negative_cone_names_its_line() {
-    let text = WHEEL.replace("TYPE", "spherical").replace("LIMITS", "cone_deg = -1");
+fn a_cone_is_from_0_to_half_a_turn() {
+    let joint = |line: &str| WHEEL.replace("TYPE", "spherical").replace("LIMITS", line);
+    for (given, expected) in [
+        ("cone_deg = -1", "`cone_deg` of loop_joint \"axle\" is -1; expected an angle from 0 to 180"),
+        ("cone_deg = 181", "`cone_deg` of loop_joint \"axle\" is 181; expected an angle from 0 to 180"),
+        ("cone_rad = -1", "`cone_rad` of loop_joint \"axle\" is -1; expected an angle from 0 to π"),
+        ("cone_rad = 3.15", "`cone_rad` of loop_joint \"axle\" is 3.15; expected an angle from 0 to π"),
+    ] {
+        assert_errors(&joint(given), &[&format!("s.toml:12:12: {expected}")]);
+        let of_link = expected.replace("loop_joint \"axle\"", "link \"lamp\"");
+        let why = SceneFile::parse(&lamp(given), "s.toml").unwrap_err().to_string();
+        assert!(why.starts_with("s.toml:8:12:") && why.contains(&of_link), "{why}");
+    }
+    assert!(SceneFile::parse(&joint("cone_deg = 180"), "s.toml").is_ok());
     assert_errors(
-        &text,
-        &["s.toml:12:12: `cone_deg` of loop_joint \"axle\" is -1; expected a number that is at least 0"],
+        &joint("second_axis = [0, 0, 0]"),
+        &[
+            "s.toml:12:15: `second_axis` of loop_joint \"axle\" is [0, 0, 0]; expected a direction: a vector that is not zero",
+        ],
+    );
+    let why = SceneFile::parse(&lamp("axis = [0, 0, 0]"), "s.toml").unwrap_err().to_string();
+    assert!(
+        why.starts_with("s.toml:8:8:") && why.contains("without a cone and limits of the twist has no axis"),
+        "{why}"
+    );
+}
+
+#[test]
+fn rest_positions_and_targets_of_a_spherical_joint_may_be_vectors() {
+    let text = lamp(
+        "spring = { stiffness_n_m_per_rad = 5, rest_deg = [90, 0, -90] }\n\
+         drive = { type = \"position\", stiffness_n_m_per_rad = 50, target_rad = [0.1, 0.2, 0.3], target_rad_per_s = [0, 0, 2] }\n\
+         dof = [{ friction_n_m = 0.3 }]",
+    );
+    let plain = text.replace("dof = [{ friction_n_m = 0.3 }]", "friction_n_m = 0.3");
+    for (text, dry) in [(text, [0.3, 0.0, 0.0]), (plain, [0.3; 3])] {
+        let world = build(&text);
+        for world in [&world, &again("vectors", &world), &again("vectors-2", &again("vectors-3", &world))] {
+            let dofs = robot(world).dofs();
+            let rest = [FRAC_PI_2, 0.0, -FRAC_PI_2];
+            for k in 0..3 {
+                assert_eq!(dofs[k].spring, Some(Spring { stiffness: 5.0, rest: rest[k] }));
+                assert_eq!(dofs[k].friction, dry[k]);
+                let Drive::Position { stiffness, target, velocity, .. } = dofs[k].drive else { panic!() };
+                assert_eq!((stiffness, target, velocity), (50.0, [0.1, 0.2, 0.3][k], [0.0, 0.0, 2.0][k]));
+            }
+        }
+    }
+    // the joint whose axes differ in vectors alone is saved in their form
+    let turned = "drive = { type = \"velocity\", target_rad_per_s = [1, 2, 3], max_torque_n_m = 4 }";
+    for (text, written) in [
+        (lamp(turned), "target_rad_per_s = [1.0, 2.0, 3.0]"),
+        (WHEEL.replace("TYPE", "spherical").replace("LIMITS", turned), "target_rad_per_s = [1.0, 2.0, 3.0]"),
+    ] {
+        let world = build(&text);
+        let folder = Folder::new("vectors-text");
+        SceneWriter::new(&world).save(folder.0.join("scene.toml")).unwrap();
+        let saved = std::fs::read_to_string(folder.0.join("scene.toml")).unwrap();
+        assert!(saved.contains(written) && !saved.contains("dof = "), "{saved}");
+        let of = |world: &World| match world.find("axle") {
+            Some(id) => (0..3).map(|k| world.get::<LoopJoint>(id).unwrap().dof_at(k).unwrap().clone()).collect(),
+            None => robot(world).dofs().to_vec(),
+        };
+        let expected = [1.0, 2.0, 3.0].map(|target| Drive::Velocity { target, limit: 4.0 });
+        for world in [&world, &again("vectors-4", &world)] {
+            assert_eq!(of(world).into_iter().map(|dof| dof.drive).collect::<Vec<_>>(), expected);
+        }
+    }
+    let why = |line: &str| SceneFile::parse(&lamp(line), "s.toml").unwrap_err().to_string();
+    let short = why("spring = { stiffness_n_m_per_rad = 5, rest_rad = [1, 2] }");
+    assert!(short.starts_with("s.toml:8:") && short.contains("3 numbers"), "{short}");
+    let own = why("dof = [{ spring = { stiffness_n_m_per_rad = 5, rest_rad = [1, 2, 3] } }]");
+    assert!(own.starts_with("s.toml:8:") && own.contains("`rest_rad` of the `spring` of dof 1 is an array"), "{own}");
+}
+
+/// A link may have a cone and limits of the twist about each of its axes, in the table of that degree of freedom.
+#[test]
+fn cones_about_several_axes_are_saved_as_a_scene() {
+    let text = lamp(
+        "dof = [{ cone_deg = 90, friction_n_m = 1 }, { twist_limits_rad = [-0.5, 0.25] }, { cone_rad = 1, twist_limits_rad = [-1, 2] }]",
+    );
+    let world = build(&text);
+    for world in [&world, &again("cones", &world), &again("cones-2", &again("cones-3", &world))] {
+        let dofs = robot(world).dofs();
+        assert_eq!([0, 1, 2].map(|k| dofs[k].limits), [Some([0.0, FRAC_PI_2]), None, Some([0.0, 1.0])]);
+        assert_eq!([0, 1, 2].map(|k| dofs[k].twist_limits), [None, Some([-0.5, 0.25]), Some([-1.0, 2.0])]);
+        assert_eq!([0, 1, 2].map(|k| dofs[k].friction), [1.0, 0.0, 0.0]);
+    }
+    let why = SceneFile::parse(&lamp("dof = [{}, { cone_rad = 4 }]"), "s.toml").unwrap_err().to_string();
+    assert!(
+        why.starts_with("s.toml:8:") && why.contains("`cone_rad` of dof 2 is 4; expected an angle from 0 to π"),
+        "{why}"
     );
 }
 

@@ -144,7 +144,7 @@ fn wrong_couplings_and_cones_are_reported() {
     let text = why(SCENE.replace("axis = [1, 0, 0]\ncone_deg", "axis = [1, 1, 0]\ncone_deg"));
     assert!(text.contains("an axis of the joint's frame"), "{text}");
     let text = why(SCENE.replace("cone_deg = 20", "cone_deg = -20"));
-    assert!(text.contains("the cone"), "{text}");
+    assert!(text.contains("`cone_deg`") && text.contains("an angle from 0 to 180"), "{text}");
 }
 
 /// A coupling of joints of two articulated bodies in a model of MuJoCo.

@@ -32,7 +32,7 @@
 
 use crate::articulated::model::playback::Playback;
 use crate::constraint::loop_joint::WIDE;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Settings of one degree of freedom. Floating joints support only damping, dry friction and velocity limits. Degree of freedom
@@ -41,7 +41,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DofSettings {
     /// Lower and upper limit of the position, rad or m. Those of degree of freedom `k` of a spherical joint are 0 and the
-    /// half angle of a cone about axis `k` of the joint's frame, x, y or z, in which the same axis of the link stays.
+    /// half angle, at most π, of a cone about axis `k` of the joint's frame, x, y or z, in which the same axis of the link stays.
     pub limits: Option<[f64; 2]>,
     /// Lower and upper limit, rad, within 2π of 0, of the turn about axis `k` of a spherical joint of an articulated body: that of
     /// the link about the axis, after the shortest turn of the joint's axis to it. `None` for all other joints; a loop joint
@@ -146,7 +146,7 @@ impl DofSettings {
     pub(crate) fn spherical_range_error(&self) -> Option<(&'static str, f64, &'static str)> {
         let below = self.limits.and_then(|[lo, cone]| {
             let lower = (lo != 0.0).then_some(("the lower limit of the cone", lo, "0: a cone has no lower limit"));
-            lower.or((cone.is_nan() || cone < 0.0).then_some(("the cone", cone, "at least 0 rad")))
+            lower.or((!(0.0..=PI).contains(&cone)).then_some(("the cone", cone, "0 to π rad; no limits for none")))
         });
         let twist = self.twist_limits.and_then(twist_fault);
         below.or(twist).or(DofSettings { limits: None, twist_limits: None, ..self.clone() }.range_error(true))

@@ -4,7 +4,7 @@ use super::turns::WIDE;
 use super::{LoopJoint, LoopJointError, LoopJointKind, Transmission};
 use crate::articulated::DofSettings;
 use crate::articulated::twist_fault;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 impl LoopJoint {
     /// Sets the constants of a gear, a rack, a screw or a pulley. The length of a pulley that was not given
@@ -144,17 +144,17 @@ impl LoopJoint {
         Ok(())
     }
 
-    /// Sets the largest swing of a spherical joint, rad, at least 0: the half angle of a cone about the z axis of B's frame in
+    /// Sets the largest swing of a spherical joint, rad, 0 to π: the half angle of a cone about the z axis of B's frame in
     /// which the z axis of A's stays; `None` for none.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for an angle below 0, [`LoopJointError::Kind`] for another kind.
+    /// [`LoopJointError::Range`] for an angle out of its range, [`LoopJointError::Kind`] for another kind.
     pub fn set_cone(&mut self, cone: Option<f64>) -> Result<(), LoopJointError> {
         if self.kind != LoopJointKind::Spherical && cone.is_some() {
             return Err(self.wrong_kind("cone"));
         }
         let angle = cone.unwrap_or(0.0);
-        self.check("the cone", angle, angle.is_finite() && angle >= 0.0, "finite and at least 0 rad")?;
+        self.check("the cone", angle, (0.0..=PI).contains(&angle), "0 to π rad; None for none")?;
         self.cone = cone;
         Ok(())
     }

@@ -98,12 +98,41 @@ impl World {
     /// # Errors
     /// [`WorldError::Stale`] if an object was removed.
     pub fn closest_points(&self, a: ObjectId, b: ObjectId) -> Result<Option<BodyDistance>, WorldError> {
+        self.closest_points_of((a, None), (b, None))
+    }
+
+    /// Returns the closest points of some parts of two objects, such as [those of a link](crate::ArticulatedBody::parts_of_link); all
+    /// parts of an object for `None`. The objects may be the same: two links of one body. `None` if a side has no shape or is disabled.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if an object was removed.
+    ///
+    /// ```
+    /// use tumble_core::prelude::*;
+    /// let mut world = World::default();
+    /// let part = |x: f64| Collider::new(Shape::sphere(0.5).unwrap(), Pose::translation(x, 0.0, 0.0));
+    /// let upper = LinkBuilder::new("upper", Joint::revolute(Vec3::z())).with_mass(1.0).with_collider(part(0.0));
+    /// let lower = LinkBuilder::new("lower", Joint::revolute(Vec3::z())).with_parent("upper").with_mass(1.0).with_collider(part(3.0));
+    /// let id = world.add(ArticulationBuilder::new("arm").link(upper).link(lower).build()?)?;
+    /// let arm = world.get::<ArticulatedBody>(id).expect("it was not removed");
+    /// let (a, b) = (arm.parts_of_link("upper")?, arm.parts_of_link("lower")?);
+    /// assert_eq!(world.closest_points_of((id, Some(&a)), (id, Some(&b)))?.map(|pair| pair.distance), Some(2.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn closest_points_of(
+        &self,
+        (a, parts_a): (ObjectId, Option<&[usize]>),
+        (b, parts_b): (ObjectId, Option<&[usize]>),
+    ) -> Result<Option<BodyDistance>, WorldError> {
         for id in [a, b] {
             self.core.table.get(id).ok_or(WorldError::Stale)?;
         }
-        let others: Vec<Part<'_>> = self.parts().filter(|part| part.id == b).collect();
+        let of = |id: ObjectId, parts: Option<&[usize]>, part: &Part<'_>| {
+            part.id == id && parts.is_none_or(|parts| parts.contains(&part.part))
+        };
+        let others: Vec<Part<'_>> = self.parts().filter(|part| of(b, parts_b, part)).collect();
         let mut best: Option<BodyDistance> = None;
-        for part in self.parts().filter(|part| part.id == a) {
+        for part in self.parts().filter(|part| of(a, parts_a, part)) {
             nearest(Some((a, part.part)), &part.shape, &part.pose, others.iter().cloned(), &mut best);
         }
         Ok(best)

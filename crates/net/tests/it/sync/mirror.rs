@@ -397,15 +397,15 @@ fn wrong_contacts_are_refused_with_their_frame() {
     pair.world.step().unwrap();
     let mut good = pair.publisher.publish(&pair.world, &viewer(1), 2).unwrap().state;
     let before = pair.mirror.hash();
-    good.truncate(good.len() - 8); // the counts of contacts and events, 0
+    good.truncate(good.len() - 12); // the counts of contacts and events, 0, and the mark of unknown pairs
     let entry = |object: u32, part: u32, x: f32| {
         let indices = [object, part, 3, 0, 0, 0].map(u32::to_le_bytes).concat();
         [&1u32.to_le_bytes()[..], &indices, &[x; 10].map(f32::to_le_bytes).concat()].concat()
     };
-    let whole = |object, part, x| [entry(object, part, x), vec![0; 4]].concat();
+    let whole = |object, part, x| [entry(object, part, x), vec![0; 4], vec![255; 4]].concat();
     let cut = entry(0, 0, 1.0)[..67].to_vec();
     let many = 257u32.to_le_bytes().to_vec();
-    for bad in [whole(99, 0, 1.0), whole(0, 7, 1.0), whole(0, 0, f32::NAN), cut, many, vec![], vec![0; 9]] {
+    for bad in [whole(99, 0, 1.0), whole(0, 7, 1.0), whole(0, 0, f32::NAN), cut, many, vec![], vec![0; 13]] {
         assert!(pair.mirror.apply_state(2, 0.5, &[&good[..], &bad].concat()).is_err());
         assert!(pair.mirror.hash() == before && pair.mirror.frame() == 1);
     }

@@ -41,7 +41,7 @@ fn other_scenes_names_and_versions_are_refused_by_name() {
     assert!(reason.contains("'facet 1'") && reason.contains("'left'"), "{reason}");
     assert_eq!(task, over(&reason));
     let (reason, _) = refusal(FacetOptions::new("facet 1", SCENE, 1), |bytes| bytes[76] = 8);
-    assert!(reason.contains("version 8") && reason.contains("version 9"), "{reason}");
+    assert!(reason.contains("version 8") && reason.contains("version 10"), "{reason}");
 }
 
 /// The hash of a facet that draws something else than was sent does not match, and the wall goes

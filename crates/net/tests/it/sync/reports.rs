@@ -128,7 +128,8 @@ fn a_replica_of_sensors_is_exact() {
     }
 }
 
-/// Without sensors, and if events are not asked for, a state has four bytes more than its poses and contacts: their count.
+/// Without sensors, and if events are not asked for, a state has eight bytes more than its poses and contacts: the count of events, and
+/// the mark that the pairs that touch are not sent.
 #[test]
 fn nothing_is_sent_that_is_not_asked_for() {
     let mut world = super::simulated_session::scene();
@@ -136,9 +137,11 @@ fn nothing_is_sent_that_is_not_asked_for() {
     assert!(!world.events().is_empty());
     let (mut plain, mut with) = (Publisher::new(&world, false, 0), Publisher::new(&world, false, 0).with_events(1024));
     let state = plain.publish(&world, &viewer(1), 1).unwrap().state;
-    assert_eq!(state[state.len() - 8..], [0; 8], "the counts of contacts and events");
+    assert_eq!(state[state.len() - 12..], [[0; 8].as_slice(), &[255; 4]].concat(), "the counts of contacts and events");
     let more = with.publish(&world, &viewer(1), 1).unwrap().state;
-    assert_eq!(more.len() - state.len(), world.events().len() * (1 + 2 * 12 + 24));
+    let pairs = world.touching_pairs().len();
+    assert!(pairs > 0);
+    assert_eq!(more.len() - state.len(), world.events().len() * (1 + 2 * 12 + 24) + pairs * (1 + 4 * 4));
 }
 
 #[test]
@@ -154,7 +157,8 @@ fn malformed_reports_are_refused_and_change_nothing() {
     let (before, events) = (mirror.hash(), world.events().len());
     assert!(events >= 1);
     let state = published.state;
-    let start = state.len() - events * (1 + 2 * 12 + 24) - 4;
+    let pairs = state.len() - world.touching_pairs().len() * (1 + 4 * 4) - 4;
+    let start = pairs - events * (1 + 2 * 12 + 24) - 4;
     assert_eq!(state[start..start + 4], (events as u32).to_le_bytes());
     let mut refused = |bytes: &[u8], why: &str| {
         let error = mirror.apply_state(2, 1.0, bytes).unwrap_err();
@@ -177,6 +181,10 @@ fn malformed_reports_are_refused_and_change_nothing() {
     refused(&with(start + 5, &999_u32.to_le_bytes()), "an event of an unknown object");
     refused(&with(start + 9, &1_u32.to_le_bytes()), "an event of an unknown part");
     refused(&with(start + 29, &f32::NAN.to_le_bytes()), "not finite");
+    refused(&with(pairs, &65_537_u32.to_le_bytes()), "more than 65536 pairs");
+    refused(&with(pairs + 4, &[2]), "an unknown flag of a pair");
+    refused(&with(pairs + 5, &999_u32.to_le_bytes()), "a pair of an unknown part");
+    refused(&with(pairs + 9, &1_u32.to_le_bytes()), "a pair of an unknown part");
     let named = |name: &str| {
         let name = [&(u32::MAX - 1).to_le_bytes()[..], &(name.len() as u32).to_le_bytes(), name.as_bytes()].concat();
         [&state[..start + 5], &name, &state[start + 17..]].concat()
@@ -234,4 +242,138 @@ fn the_recording_of_a_session_has_sensors_and_events() {
         );
         assert!(expected.iter().all(|(readings, ..)| readings.len() == 2));
     }
+}
+
+/// The pairs that touch, by the names of the others.
+fn touching(world: &World, name: &str) -> Vec<(String, usize)> {
+    let id = world.find(name).unwrap();
+    world.touching(id).into_iter().map(|(id, part)| (world.name(id).unwrap().to_string(), part)).collect()
+}
+
+/// `World::touching` of a facet is that of the server if events are sent, in every frame, also for a facet that missed frames or joined
+/// late; without events the facet says that it does not know.
+#[test]
+fn a_facet_knows_what_touches_if_events_are_sent() {
+    for sends in [true, false] {
+        let mut world = scene();
+        let publisher = Publisher::new(&world, false, 0);
+        let mut publisher = if sends { publisher.with_events(1) } else { publisher };
+        let (mut mirror, mut seen) = (Mirror::new(scene()), 0);
+        for frame in 1..=200 {
+            (0..4).for_each(|_| _ = world.step().unwrap());
+            let published = publisher.publish(&world, &viewer(frame), frame).unwrap();
+            if frame % 7 != 0 {
+                continue; // missed
+            }
+            if mirror.revision().is_none() {
+                mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+            }
+            mirror.apply_state(frame, world.time(), &published.state).unwrap();
+            assert_eq!(mirror.hash(), published.hash, "frame {frame}");
+            assert_eq!(mirror.world().knows_touching(), sends);
+            for name in ["ground", "gate", "ball 0", "ball 1", "ball 2", "weight"] {
+                let expected = touching(&world, name);
+                seen += expected.len();
+                assert_eq!(touching(mirror.world(), name), if sends { expected } else { Vec::new() }, "{name}");
+            }
+        }
+        assert!(seen > 50 && world.knows_touching(), "{seen}");
+    }
+}
+
+/// Sensors that a program adds while a cave runs, on bodies of the scene, on bodies and robots that it adds too, and on joints that a facet
+/// does not have, are read in the facet, and images are made there.
+#[test]
+fn sensors_that_a_program_adds_are_sent() {
+    use tumble_core::{ArticulationBuilder, Joint, LinkBuilder, SensorPlace};
+    for exact in [false, true] {
+        let mut world = scene();
+        let (mut publisher, mut mirror) = (Publisher::new(&world, exact, 0), Mirror::new(scene()));
+        let mut added = Vec::new();
+        for frame in 1..=60 {
+            if frame == 10 {
+                let on = |id| Anchor::on(id, 0, Pose::identity());
+                let ball = world.find("ball 2").unwrap();
+                let noise =
+                    SensorNoise { deviation: 0.1, bias_walk: 0.01, delay: 3, seed: 9, ..SensorNoise::default() };
+                let imu = Sensor::new("late imu", SensorKind::Accelerometer, on(ball)).unwrap();
+                added.push(world.add(imu.with_noise(noise).unwrap()).unwrap());
+                let link = LinkBuilder::new("arm", Joint::revolute(Vec3::y()));
+                let shape = Shape::capsule(0.05, 0.4).unwrap();
+                let arm =
+                    ArticulationBuilder::new("late arm").link(link.with_shape(shape, Pose::translation(0.2, 0.0, 0.0)));
+                let arm = world.add(arm.build().unwrap()).unwrap();
+                added.push(world.add(Sensor::of_dof("angle", SensorKind::JointPosition, arm, 0).unwrap()).unwrap());
+                added.push(world.add(Sensor::new("strain", SensorKind::Torque, on(arm)).unwrap()).unwrap());
+                let hook = LoopJoint::new("hook", LoopJointKind::Spherical, Anchor::world(Pose::identity()), on(ball))
+                    .unwrap();
+                let hook = world.add(hook).unwrap();
+                let pull = Sensor::at("pull".into(), SensorKind::Force, SensorPlace::LoopJoint(hook)).unwrap();
+                added.push(world.add(pull).unwrap());
+                let optics = Optics { resolution: [5, 4], vertical_fov: 0.8 };
+                let down = Pose::new(Vec3::new(0.0, 0.0, 2.0), Vec3::x() * std::f64::consts::PI);
+                let eye = Sensor::new("late eye", SensorKind::Depth, Anchor::world(down)).unwrap();
+                world.add(eye.with_optics(optics).unwrap()).unwrap();
+            }
+            if frame == 40 {
+                world.remove(world.find("late imu").unwrap()).unwrap();
+            }
+            (0..4).for_each(|_| _ = world.step().unwrap());
+            let published = publisher.publish(&world, &viewer(frame), frame).unwrap();
+            if published.fresh {
+                mirror.apply_snapshot(&publisher.snapshot()).unwrap();
+            }
+            mirror.apply_state(frame, world.time(), &published.state).unwrap();
+            assert_eq!(mirror.hash(), published.hash, "frame {frame}");
+            assert_eq!(readings(mirror.world()), readings(&world), "frame {frame}");
+            let count = match frame {
+                ..10 => 2,
+                ..40 => 6,
+                _ => 5,
+            };
+            assert_eq!(readings(mirror.world()).len(), count, "frame {frame}");
+            if frame == 30 {
+                for id in &added {
+                    let sensor = mirror.world().find(world.name(*id).unwrap()).unwrap();
+                    assert_eq!(mirror.world().reading(sensor), world.reading(*id));
+                    assert!(world.reading(*id).unwrap().iter().any(|x| *x != 0.0), "{}", world.name(*id).unwrap());
+                }
+                // made from the poses that the facet shows
+                let seen = |world: &World| world.depth_image(world.find("late eye").unwrap()).unwrap().pixels;
+                let (here, there) = (seen(mirror.world()), seen(&world));
+                let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-3;
+                let agree = here.iter().zip(&there).filter(|pair| near(*pair)).count();
+                assert!(agree >= 16 && here.len() == 20, "{here:?} {there:?}");
+            }
+        }
+    }
+}
+
+/// A table with a damaged sensor is refused whole.
+#[test]
+fn a_damaged_sensor_of_a_table_is_refused() {
+    let mut world = scene();
+    let mut publisher = Publisher::new(&world, false, 0);
+    let ball = world.find("ball 2").unwrap();
+    let imu = Sensor::new("late imu", SensorKind::Gyroscope, Anchor::on(ball, 0, Pose::identity())).unwrap();
+    world.add(imu.with_noise(SensorNoise { deviation: 0.5, ..SensorNoise::default() }).unwrap()).unwrap();
+    publisher.publish(&world, &viewer(1), 1).unwrap();
+    let table = publisher.snapshot().to_vec();
+    let mut mirror = Mirror::new(scene());
+    mirror.apply_snapshot(&table).unwrap();
+    let at = table.windows(8).position(|bytes| bytes == b"late imu").unwrap() + 8 + 8 + 4;
+    let damaged = |place: usize, bytes: &[u8]| {
+        let mut damaged = table.clone();
+        damaged[at + place..at + place + bytes.len()].copy_from_slice(bytes);
+        Mirror::new(scene()).apply_snapshot(&damaged).unwrap_err()
+    };
+    let malformed = |error: MessageError| matches!(error, MessageError::Malformed(_));
+    assert!(malformed(damaged(0, &[200])), "an unknown kind");
+    assert!(malformed(damaged(9, &f64::NAN.to_le_bytes())), "a deviation that is not finite");
+    assert!(matches!(damaged(1, &(-1.0f64).to_le_bytes()), MessageError::Unfit(_)), "a cutoff below 0");
+    assert!(matches!(damaged(33, &u32::MAX.to_le_bytes()), MessageError::Unfit(_)), "a delay without end");
+    assert!(malformed(damaged(45, &1000u32.to_le_bytes())), "an object that is not there");
+    assert!(malformed(damaged(49, &7u32.to_le_bytes())), "a part that is not there");
+    assert!(malformed(damaged(77, &1.0f64.to_le_bytes())), "a rotation of another length");
+    assert_eq!(mirror.world().sensors().count(), 6);
 }

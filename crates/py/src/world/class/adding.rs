@@ -1,6 +1,7 @@
 //! Bodies, joints and sensors that a program adds to a world.
 
-use crate::arrays::convert::{pose, vec3, vec3_or, whole_number};
+use crate::arrays::convert::{pose, vec3, vec3_or};
+use crate::arrays::whole;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::objects::articulation::Articulation;
@@ -60,7 +61,7 @@ impl World {
         kinematic: bool,
         collidable: bool,
         contacts: &str,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: bool,
         inertia: Option<&Bound<'_, PyAny>>,
@@ -120,7 +121,7 @@ impl World {
         friction: f64,
         collidable: bool,
         contacts: &str,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: bool,
         intersect: Option<&Bound<'_, PyAny>>,
@@ -214,7 +215,7 @@ impl World {
         damping: f64,
         friction: f64,
         breaking_torque: Option<f64>,
-        teeth: Option<[i32; 2]>,
+        #[pyo3(from_py_with = whole::teeth)] teeth: Option<[i32; 2]>,
         radius: Option<f64>,
         pitch: Option<f64>,
         ratio: f64,
@@ -287,7 +288,7 @@ impl World {
     /// on: a body, a link (``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``) or a joint, as handle or name; None is the world.
     /// position: shape (3,), m, and orientation, (x, y, z, w): the site in the frame of the body or link. relative_to: a body or link
     /// against whose frame positions, orientations and velocities are read. volume: a shape at the site; touch outside does not
-    /// count. cutoff: largest absolute value of a reading.
+    /// count. cutoff: largest absolute value of a reading; of a camera of any kind the largest depth that it sees, m.
     ///
     /// deviation: standard deviation of white noise. bias_walk: that of the change of a bias in a second. quantization: distance
     /// of the values that a reading can have. delay: steps by which it is late. seed: start of the noise.
@@ -315,9 +316,9 @@ impl World {
         deviation: f64,
         bias_walk: f64,
         quantization: f64,
-        delay: u32,
-        seed: u64,
-        resolution: Option<[u32; 2]>,
+        #[pyo3(from_py_with = whole::delay)] delay: u32,
+        #[pyo3(from_py_with = whole::seed)] seed: u64,
+        #[pyo3(from_py_with = whole::resolution)] resolution: Option<[u32; 2]>,
         vertical_fov: Option<f64>,
     ) -> Result<Sensor> {
         let noise = SensorNoise { deviation, bias_walk, quantization, delay, seed };

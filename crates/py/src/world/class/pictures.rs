@@ -1,6 +1,6 @@
 //! Pictures, windows and plots of a world.
 
-use crate::arrays::convert::whole_number;
+use crate::arrays::whole;
 use crate::errors::Result;
 use crate::io::picture::Shot;
 use crate::world::class::World;
@@ -24,8 +24,8 @@ impl World {
     fn render<'py>(
         &self,
         py: Python<'py>,
-        #[pyo3(from_py_with = whole_number)] width: Option<u32>,
-        #[pyo3(from_py_with = whole_number)] height: Option<u32>,
+        #[pyo3(from_py_with = whole::width)] width: Option<u32>,
+        #[pyo3(from_py_with = whole::height)] height: Option<u32>,
         camera: Option<&Bound<'py, PyAny>>,
         facet: Option<&str>,
         cave: Option<&str>,
@@ -46,8 +46,8 @@ impl World {
         slf: &Bound<'_, Self>,
         block: bool,
         title: Option<&str>,
-        #[pyo3(from_py_with = whole_number)] width: u32,
-        #[pyo3(from_py_with = whole_number)] height: u32,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
     ) -> Result<Py<PyAny>> {
         let options = PyDict::new(slf.py());
         options.set_item("block", block)?;

@@ -1,6 +1,7 @@
 //! Queries of the present of a world: contacts, events, rays, overlaps, distances, energy, the report of a step.
 
-use crate::arrays::convert::{vector, whole_number};
+use crate::arrays::convert::vector;
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
@@ -53,8 +54,8 @@ impl World {
     fn shape_name(
         &self,
         body: &Bound<'_, PyAny>,
-        #[pyo3(from_py_with = whole_number)] part: usize,
-        #[pyo3(from_py_with = whole_number)] shape: usize,
+        #[pyo3(from_py_with = whole::part)] part: usize,
+        #[pyo3(from_py_with = whole::shape)] shape: usize,
     ) -> Result<Option<String>> {
         let named = body.is_instance_of::<PyString>() || body.extract::<usize>().is_err();
         let handle = named.then(|| own_place(&self.shared, body)).transpose()?;
@@ -84,7 +85,7 @@ impl World {
     ///
     /// A ray that starts inside a convex shape does not meet that shape; a mesh is hit on its outside
     /// only. group, mask, ignore: the query has a collision group (0 to 63) and a mask (the
-    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (a handle, a
+    /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (handles, a
     /// name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
     /// with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
     #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None))]
@@ -95,7 +96,7 @@ impl World {
         origins: &Bound<'_, PyAny>,
         directions: &Bound<'_, PyAny>,
         max_distance: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
@@ -127,7 +128,7 @@ impl World {
         max_distance: f64,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
@@ -148,7 +149,7 @@ impl World {
         shape: PyRef<'_, Shape>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
@@ -156,10 +157,10 @@ impl World {
         query::overlaps(&self.shared, py, &shape, (position, orientation), &Selection { group, mask, ignore, as_body })
     }
 
-    /// Returns the closest points of two bodies, or of a shape at a pose and a body, the nearest one
-    /// if ``b`` is None. None if a body has no shape or is disabled.
+    /// Returns the closest points of two bodies or links, or of a shape at a pose and a body or link, the nearest one
+    /// if ``b`` is None. None if one has no shape or is disabled. Two links may be of one articulation.
     ///
-    /// a: a handle, a name or a shape. position, orientation: of a shape. Fields: ``distance``, m, the
+    /// a: a body or link (a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link)), or a shape; b: a body or link. position, orientation: of a shape. Fields: ``distance``, m, the
     /// negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
     /// for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
     /// the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.
@@ -172,7 +173,7 @@ impl World {
         b: Option<&Bound<'_, PyAny>>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
@@ -195,7 +196,7 @@ impl World {
         &self,
         py: Python<'py>,
         point: &Bound<'_, PyAny>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
@@ -215,7 +216,7 @@ impl World {
         &self,
         py: Python<'py>,
         points: &Bound<'_, PyAny>,
-        #[pyo3(from_py_with = whole_number)] group: u8,
+        #[pyo3(from_py_with = whole::group)] group: u8,
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,

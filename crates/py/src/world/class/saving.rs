@@ -1,6 +1,7 @@
 //! Saved, copied and forked worlds, and rollouts.
 
-use crate::arrays::convert::{numbers, path, whole_number};
+use crate::arrays::convert::{numbers, path};
+use crate::arrays::whole;
 use crate::batch::crew;
 use crate::errors::Result;
 use crate::extension::callbacks::{Extensions, Reduced};
@@ -103,8 +104,8 @@ impl World {
         controls: &Bound<'py, PyAny>,
         articulations: Option<Vec<Bound<'py, PyAny>>>,
         states: Option<&Bound<'py, PyAny>>,
-        #[pyo3(from_py_with = whole_number)] every: usize,
-        #[pyo3(from_py_with = whole_number)] threads: Option<usize>,
+        #[pyo3(from_py_with = whole::every)] every: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<usize>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
         let threads = crew::checked(threads)?;
         let asked = articulations

@@ -1,6 +1,7 @@
 //! Settings of a world, and its clock.
 
-use crate::arrays::convert::{vec3, vector, whole_number};
+use crate::arrays::convert::{vec3, vector};
+use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::world::class::World;
 use crate::world::pairs::combine;
@@ -53,7 +54,7 @@ impl World {
     }
 
     #[setter]
-    fn set_threads(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+    fn set_threads(&self, py: Python<'_>, #[pyo3(from_py_with = whole::threads)] value: u32) -> Result<()> {
         self.set(py, |s| s.threads = value)
     }
 
@@ -67,7 +68,7 @@ impl World {
     }
 
     #[setter]
-    fn set_budget(&self, py: Python<'_>, value: Option<u32>) -> Result<()> {
+    fn set_budget(&self, py: Python<'_>, #[pyo3(from_py_with = whole::budget)] value: Option<u32>) -> Result<()> {
         self.set(py, |s| s.solver_settings.budget = value)
     }
 
@@ -146,7 +147,7 @@ impl World {
     }
 
     #[setter]
-    fn set_substeps(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+    fn set_substeps(&self, py: Python<'_>, #[pyo3(from_py_with = whole::substeps)] value: u32) -> Result<()> {
         self.set(py, |s| s.substeps = value)
     }
 
@@ -157,7 +158,7 @@ impl World {
     }
 
     #[setter]
-    fn set_iterations(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+    fn set_iterations(&self, py: Python<'_>, #[pyo3(from_py_with = whole::iterations)] value: u32) -> Result<()> {
         self.set(py, |s| s.solver_settings.max_sweeps = value)
     }
 
@@ -168,7 +169,11 @@ impl World {
     }
 
     #[setter]
-    fn set_max_relaxations(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+    fn set_max_relaxations(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::max_relaxations)] value: u32,
+    ) -> Result<()> {
         self.set(py, |s| s.solver_settings.max_relaxations = value)
     }
 
@@ -190,7 +195,11 @@ impl World {
     }
 
     #[setter]
-    fn set_projection_sweeps(&self, py: Python<'_>, #[pyo3(from_py_with = whole_number)] value: u32) -> Result<()> {
+    fn set_projection_sweeps(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::projection_sweeps)] value: u32,
+    ) -> Result<()> {
         self.set(py, |s| s.projection_sweeps = value)
     }
 
