@@ -11,7 +11,7 @@ class Tether(tumble.Force):
         view.force += -SPRING * view.position - DRAG * view.velocity
 
 
-world = tumble.World(gravity=(0, 0, 0), dt=1 / 2000)
+world = tumble.World(gravity=(0, 0, 0), dt=1 / 2000, stepper="backtracking", integrator="rk4")
 masses = np.array([0.5, 1.0, 2.0])
 bodies = [world.add_rigid(tumble.Sphere(0.1), mass=m, position=(1, 3 * k, 0), collidable=False) for k, m in enumerate(masses)]
 world.add_force("tether", Tether())

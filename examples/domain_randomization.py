@@ -1,4 +1,4 @@
-"""A thousand worlds of random mass, friction, step and speed: each block stops after v²/(2µg), whatever its mass.
+"""Two hundred worlds of random mass, friction, step and speed: each block stops after v²/(2µg), whatever its mass.
 
     python examples/domain_randomization.py
 """

@@ -3,22 +3,17 @@
 import numpy as np
 import tumble
 
-HINGE = 'joint = "revolute", axis = [0, 1, 0], mass_kg = 1, inertia_kg_m2 = [0, 0, 0]'  # each bar is a point of 1 kg at its middle
-SCENE = f"""
-loop_joint = [{{ name = "ground", type = "spherical", a = "linkage/rocker", position_m = [1, 0, 0] }}]
-[[articulated]]
-name = "linkage"
-link = [
-    {{ name = "crank", {HINGE}, angle_deg = 40, center_m = [0, 0, -0.25] }},
-    {{ name = "coupler", parent = "crank", position_m = [0, 0, -0.5], {HINGE}, angle_deg = -40, center_m = [0.5, 0, 0] }},
-    {{ name = "rocker", parent = "coupler", position_m = [1, 0, 0], {HINGE}, angle_deg = 40, center_m = [0, 0, 0.25] }},
-    {{ name = "pin", parent = "rocker", joint = "fixed", position_m = [0, 0, 0.5] }},
-]"""
-world = tumble.World.parse(SCENE)
-linkage, gaps, angles = world.articulation("linkage"), [], [np.radians(40)]
+HINGE, LEAN = {"axis": (0, 1, 0), "mass": 1}, np.radians(40)  # each bar is a point of 1 kg at its middle
+world, builder = tumble.World(dt=1 / 2400), tumble.ArticulationBuilder("linkage")
+builder.add_link("crank", center_of_mass=(0, 0, -0.25), q=LEAN, **HINGE)
+builder.add_link("coupler", "crank", position=(0, 0, -0.5), center_of_mass=(0.5, 0, 0), q=-LEAN, **HINGE)
+builder.add_link("rocker", "coupler", position=(1, 0, 0), center_of_mass=(0, 0, 0.25), q=LEAN, **HINGE)
+builder.add_link("pin", "rocker", joint="fixed", position=(0, 0, 0.5))
+linkage, gaps, angles = world.add_articulation(builder), [], [LEAN]
+world.add_joint("spherical", (linkage, "rocker"), point=(1, 0, 0))
 for _ in range(2400):
-    world.step()
+    world.step(10)
     angles.append(linkage.q[0])
     gaps.append(np.linalg.norm(linkage.link_pose("pin")[:3] - (1, 0, 0)))
-crossings = [world.dt * (k + a / (a - b)) for k, (a, b) in enumerate(zip(angles, angles[1:])) if a > 0 >= b]
+crossings = [(k + a / (a - b)) / 240 for k, (a, b) in enumerate(zip(angles, angles[1:])) if a > 0 >= b]
 print(f"open by at most {max(gaps):.1e} m in 10 s; period {np.diff(crossings).mean():.6f} s")

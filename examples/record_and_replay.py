@@ -1,7 +1,4 @@
-"""A throw is recorded to a file that Foxglove opens, read back as arrays, and continued from its middle.
-
-    python examples/record_and_replay.py [FILE.mcap]
-"""
+"""A throw is recorded to a file that Foxglove opens, read back as arrays, continued from its middle, and shown as a video.   python examples/record_and_replay.py [FILE.mcap [VIDEO.mp4]]"""
 
 import sys
 import tumble
@@ -16,9 +13,10 @@ run = tumble.read(path)  # times (n,), and of each body positions (n, 3) and ori
 parabola = 5 * run.times - 9.81 * run.times**2 / 2
 error = abs(run.position("ball")[:, 2] - parabola).max()
 energies = [each.energy().total for each in tumble.replay(path, world.fork())]  # the world itself at each frame
-
 again = world.fork()
 again.restore(run.states[30])  # the exact state of the middle
 again.step(120)
 same = again.save() == world.save()
+if len(sys.argv) > 2:
+    run.video(sys.argv[2], world)  # a .png, which is animated, needs no ffmpeg
 print(f"{len(run.times)} frames: within {error:.1e} m of the parabola, {energies[0]:.3f} to {energies[-1]:.3f} J, the same end: {same}")

@@ -1,7 +1,5 @@
 """The short programs of ``examples/`` against closed forms that they do not compute, or compute in another way."""
 
-import ast
-import importlib.util
 import runpy
 import sys
 from pathlib import Path
@@ -59,7 +57,7 @@ def test_a_parallelogram_stays_closed_and_has_its_period(run):
     a, b = 1.0, np.cos(np.radians(20))
     for _ in range(6):
         a, b = (a + b) / 2, np.sqrt(a * b)
-    assert np.diff(names["crossings"]).mean() == pytest.approx(2 * np.pi * np.sqrt(0.375 / G) / a, rel=1e-4)
+    assert np.diff(names["crossings"]).mean() == pytest.approx(2 * np.pi * np.sqrt(0.375 / G) / a, rel=1e-6)
 
 
 PANDA = "cmeel.prefix/share/example-robot-data/robots/panda_description/urdf/panda.urdf"
@@ -100,26 +98,11 @@ def test_random_search_comes_near_the_best_there_is(run):
     assert [cart.q[0], cart.qd[0]] == pytest.approx(conditions @ mean, abs=1e-9)
 
 
-def code(path):
-    """The lines of a program that are not blank and not its description."""
-    tree = ast.parse(path.read_text())
-    first = tree.body[1].lineno if ast.get_docstring(tree) else 1
-    return [line for line in path.read_text().splitlines()[first - 1 :] if line.strip() and not line.strip().startswith("#")]
-
-
-def test_forks_find_the_least_time_as_in_mujoco_and_in_fewer_lines(run):
+def test_forks_find_the_least_time(run):
     names = run("fork_control")
     # bang-bang: 1 m with 4 N on 1 kg takes 2 √(m d/F) = 1 s, and 50 steps of 0.02 s hit it
     assert names["world"].time == pytest.approx(1.0) and names["cart"].q == pytest.approx([1.0], abs=1e-9)
     assert names["cart"].qd == pytest.approx([0.0], abs=1e-9)
-    twin = EXAMPLES.parent / "benches" / "python" / "fork_control_mujoco.py"
-    ours, theirs = code(EXAMPLES / "fork_control.py"), code(twin)
-    print(f"lines: {len(ours)} and {len(theirs)} with MuJoCo; characters: {len(''.join(ours))} and {len(''.join(theirs))}")
-    assert len(ours) <= len(theirs) and len("".join(ours)) <= len("".join(theirs))
-    if importlib.util.find_spec("mujoco") is None:
-        pytest.skip("SKIPPED: MuJoCo is not installed; `make references` installs it")
-    data = runpy.run_path(str(twin))["data"]
-    assert data.time == pytest.approx(1.0) and data.qpos == pytest.approx([1.0], abs=1e-9) and data.qvel == pytest.approx([0.0], abs=1e-9)
 
 
 def test_blocks_stop_by_their_friction_whatever_their_mass(run):
@@ -132,6 +115,15 @@ def test_a_throw_is_recorded_and_gone_on_with(run):
     assert names["error"] < 1e-12 and names["same"]
     ball, turning = 0.5 * (3**2 + 5**2), 0.5 * 0.4 * 0.1**2 * 9**2
     assert names["energies"] == pytest.approx([ball + turning] * 61, rel=1e-12)
+
+
+def test_a_throw_is_shown_as_a_video(run, tmp_path):
+    try:
+        tumble.World().render(8, 8)
+    except tumble.PictureError as error:
+        pytest.skip(f"SKIPPED: {error}")
+    run("record_and_replay", "throw.mcap", "throw.png")
+    assert (tmp_path / "throw.png").read_bytes().count(b"fcTL") == 31, "images of a second at 30 in a second, the first included"
 
 
 def test_a_snapshot_has_one_future(run, capsys):
@@ -200,7 +192,7 @@ def test_a_block_slides_down_a_hill(run):
 
 def test_a_force_in_python_makes_damped_oscillations(run):
     names = run("custom_force")
-    assert len(names["bodies"]) == 3 and names["error"] < 1e-3
+    assert len(names["bodies"]) == 3 and names["error"] < 1e-9
 
 
 def test_a_thousand_pendulums_stand_up(run):

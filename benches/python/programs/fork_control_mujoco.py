@@ -1,6 +1,8 @@
 """The program ``examples/fork_control.py`` with MuJoCo, as short as its own module ``rollout`` allows.
 
-    target/python/bin/python benches/python/fork_control_mujoco.py
+    target/python/bin/python benches/python/programs/fork_control_mujoco.py
+
+Both end within 1e-15 of rest at 1 m. With one instance of the data its forks run on one core; the state is copied out of the data before each rollout.
 """
 
 import mujoco
