@@ -43,7 +43,8 @@ pub fn part_of(world: &Core, shared: Option<&Arc<Shared>>, value: &Bound<'_, PyA
     }
     if let Ok(link) = value.cast::<Link>() {
         let articulation = link.get().articulation().bind(value.py()).clone().into_any();
-        return part_of(world, shared, &(articulation, link.get().name()).into_pyobject(value.py())?);
+        let pair = (articulation, link.get().name()).into_pyobject(value.py())?;
+        return part_of(world, shared, pair.as_any());
     }
     if let Ok(pair) = value.cast::<PyTuple>()
         && let Ok((body, link)) = pair.extract::<(Bound<'_, PyAny>, String)>()

@@ -7,8 +7,7 @@ use crate::objects::builder::pair;
 use crate::objects::joint::Joint;
 use crate::objects::joint_dof;
 use crate::objects::joints::{component, drive_at};
-use crate::objects::place::{Place, by_name};
-use crate::world::add::own_place;
+use crate::objects::place::Place;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
 use crate::world::target::target;
@@ -16,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
+use tumble::dynamics::{DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
 
 /// The arguments of ``add_joint``.
 pub struct Arguments<'a, 'py> {

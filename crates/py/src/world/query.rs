@@ -2,10 +2,8 @@
 
 use crate::arrays::convert::{Numbers, number, numbers, pose, shown, vec3};
 use crate::errors::{Error, Result};
-use crate::objects::link::Link;
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
-use crate::world::add::own_place;
 use crate::world::contacts::{link, shape_number};
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;

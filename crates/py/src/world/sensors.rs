@@ -3,10 +3,9 @@
 use crate::arrays::convert::{number, pose};
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
-use crate::objects::place::{Place, by_name};
+use crate::objects::place::Place;
 use crate::objects::sensor::Sensor;
 use crate::objects::shapes::Shape;
-use crate::world::add::own_place;
 use crate::world::inner::Inner;
 use crate::world::joints;
 use crate::world::query::Numbering;
@@ -18,8 +17,7 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{
-    Anchor, ArticulatedBody, ObjectId, Optics, RigidBody as Rigid, Sensor as Core, SensorImage, SensorKind,
-    SensorNoise, SensorPlace,
+    Anchor, ObjectId, Optics, RigidBody as Rigid, Sensor as Core, SensorImage, SensorKind, SensorNoise, SensorPlace,
 };
 
 /// The arguments of ``add_sensor``.
