@@ -150,6 +150,9 @@ def test_a_page_holds_all_of_its_images(swing, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["swing.html", "swing.png"]
     with pytest.raises(ValueError, match="expected the name of an .html, .png or .apng file"):
         animation.save(tmp_path / "swing.gif")
+    for write in (animation.save, swing.video):
+        with pytest.raises(tumble.UnreadableFileError, match="there is no folder"):
+            write(tmp_path / "missing" / "swing.png")
     assert png(canvas)[:8] == b"\x89PNG\r\n\x1a\n"
 
 

@@ -13,7 +13,7 @@ use crate::urdf::UrdfError;
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The file could not be opened or read.
-    #[error("{}: cannot read it: {source}; give the path of a scene.toml or its folder, a URDF or a mesh", file.display())]
+    #[error("{}: cannot read it: {source}; give the path of a scene.toml or its folder, a URDF, MJCF or SDF file, or a mesh", file.display())]
     Read {
         /// The path that was tried.
         file: PathBuf,

@@ -32,7 +32,7 @@ pub enum ArticulationError {
     },
     /// A link has a mass, and no shape over which it is distributed.
     #[error(
-        "articulated body '{body}', link '{link}': it has a mass but no shape over which it is distributed; give it a shape, or mass, center and inertia"
+        "articulated body '{body}', link '{link}': it has a mass but no shape over which it is distributed; give it a shape, or a center of mass (a point mass there) and, if it has one, an inertia"
     )]
     NoShape {
         /// Body.

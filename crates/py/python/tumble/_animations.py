@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tumble._errors import InvalidValueError, PictureError
+from tumble._errors import InvalidValueError, PictureError, UnreadableFileError
 
 _TIMEOUT = 60.0
 """Longest time that ffmpeg may take for one frame, or to end, s."""
@@ -50,9 +50,17 @@ def instants(times: NDArray[np.float64], fps: float, speed: float) -> list[int]:
     return [int(k) for k in np.searchsorted(times, wanted + 1e-9, side="right") - 1]
 
 
+def in_a_folder(path: str | PathLike[str]) -> Path:
+    """Returns the path of a file to write, whose folder must be there."""
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise UnreadableFileError(f"{path}: cannot write it: there is no folder {target.parent}")
+    return target
+
+
 def write_video(path: str | PathLike[str], shots: Iterable[Shot], fps: float) -> None:
     """Encodes images as a video by the program ffmpeg; the extension of the path sets the format."""
-    target = Path(path)
+    target = in_a_folder(path)
     part = target.with_name(f".{target.stem}.{os.getpid()}.unfinished{target.suffix}")
     video: _Ffmpeg | None = None
     try:
@@ -245,7 +253,7 @@ class Animation:
         if kind not in (".html", ".png", ".apng"):
             raise InvalidValueError(f"{path}: expected the name of an .html, .png or .apng file")
         data = self.html.encode() if kind == ".html" else animated_png(self._parts, self.fps)
-        target = Path(path)
+        target = in_a_folder(path)
         part = target.with_name(f".{target.name}.{os.getpid()}.unfinished")
         try:
             part.write_bytes(data)

@@ -20,10 +20,10 @@ _Path: TypeAlias = str | PathLike[str]
 _Body: TypeAlias = RigidBody | Articulation | str
 _BodyOrLink: TypeAlias = RigidBody | Articulation | Link | str | tuple[Articulation | str, str]
 _Object: TypeAlias = (
-    RigidBody | Articulation | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
+    RigidBody | Articulation | Link | Joint | SpringMesh | ParticleSystem | Flock | BodyFlock | Boid | ScriptedEvent | Template | str | tuple[Articulation | str, str]
 )
 _Several: TypeAlias = _Object | list[_Object]
-_Side: TypeAlias = _Body | tuple[Articulation | str, str] | None
+_Side: TypeAlias = _BodyOrLink | None
 
 __version__: str
 
@@ -1580,6 +1580,18 @@ class Link:
         """
     @mask.setter
     def mask(self, value: int | Sequence[int] | None) -> None: ...
+    @property
+    def position(self) -> _Floats:
+        """."""
+    @property
+    def orientation(self) -> _Floats:
+        """."""
+    @property
+    def velocity(self) -> _Floats:
+        """."""
+    @property
+    def angular_velocity(self) -> _Floats:
+        """."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def attach_camera(

@@ -79,7 +79,7 @@ pub fn place_of(body: &Bound<'_, PyAny>) -> Result<Place> {
     }
     match body.cast::<RigidBody>() {
         Ok(body) => Ok(body.get().place.clone()),
-        Err(_) => Err(PyTypeError::new_err("expected a body: a handle or a name").into()),
+        Err(_) => Err(PyTypeError::new_err("expected a handle or the name of an object").into()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! One link of an articulated body.
 
-use crate::arrays::convert::{symmetric, vec3, vector};
+use crate::arrays::convert::{quaternion, symmetric, vec3, vector};
 use crate::arrays::whole;
 use crate::errors::Result;
 use crate::objects::articulation::Articulation;
@@ -9,9 +9,10 @@ use crate::world::query;
 use numpy::{PyArray1, PyArray2};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use tumble::collide::{Pose, Vec3};
 use tumble::dynamics::{ArticulatedBody, CollisionGroup, LinkMass};
 
-/// A link of an articulation: its mass, and what its shapes collide with.
+/// A link of an articulation: its motion, its mass, and what its shapes collide with.
 ///
 /// ``Articulation.link`` returns it, also for a fixed link. A handle without data of its own. It can be changed if the
 /// articulation is in a world.
@@ -48,6 +49,19 @@ impl Link {
         change(&mut mass)?;
         let place = self.body(py).in_world()?;
         place.write(py, |inner| Ok(inner.world.set_link_mass(place.id, &self.name, mass)?))
+    }
+
+    /// Returns pose and velocity of its frame, and its angular velocity, in a world.
+    fn motion(&self, py: Python<'_>) -> Result<(Pose, Vec3, Vec3)> {
+        let place = self.body(py).in_world()?;
+        place.read(|inner| {
+            let body = inner.world.get::<ArticulatedBody>(place.id)?;
+            let frame = body.model().frame(&self.name)?;
+            let part = inner.world.part_state(place.id, frame.link.unwrap_or(body.model().links().len()))?;
+            let pose = part.pose * frame.pose;
+            let arm = pose.translation.vector - part.position();
+            Some((pose, part.velocity + part.angular_velocity.cross(&arm), part.angular_velocity))
+        })
     }
 
     /// Returns group and mask of its shapes, where they are the same.
@@ -127,6 +141,30 @@ impl Link {
             own.center = center;
             Ok(())
         })
+    }
+
+    /// Position of the origin of its frame, shape (3,), meters, world axes.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.motion(py)?.0.translation.vector))
+    }
+
+    /// Orientation, link to world, unit quaternion (x, y, z, w), shape (4,).
+    #[getter]
+    fn orientation<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(quaternion(py, &self.motion(py)?.0.rotation))
+    }
+
+    /// Velocity of the origin of its frame, shape (3,), m/s, world axes.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.motion(py)?.1))
+    }
+
+    /// Angular velocity, shape (3,), rad/s, world axes.
+    #[getter]
+    fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
+        Ok(vector(py, &self.motion(py)?.2))
     }
 
     /// Collision group of its shapes, 0 to 63; None if it has none or they differ. Shapes of links that are fixed to each

@@ -9,6 +9,7 @@ pub mod world;
 use crate::errors::{Error, Result};
 use crate::objects::bodies::place_of;
 use crate::objects::joint::Joint;
+use crate::objects::link::Link;
 use crate::objects::mimic::Mimic;
 use crate::objects::place::Place;
 use crate::world::shared::Shared;
@@ -39,6 +40,11 @@ pub fn part_of(world: &Core, shared: Option<&Arc<Shared>>, value: &Bound<'_, PyA
         let name: String = value.extract()?;
         return part_by_name(world, &name)
             .ok_or_else(|| Error::Name(format!("the world has no object named '{name}'")));
+    }
+    if let Ok(link) = value.cast::<Link>() {
+        let articulation = link.get().articulation().bind(value.py()).clone().into_any();
+        let pair = (articulation, link.get().name()).into_pyobject(value.py())?;
+        return part_of(world, shared, pair.as_any());
     }
     if let Ok(pair) = value.cast::<PyTuple>()
         && let Ok((body, link)) = pair.extract::<(Bound<'_, PyAny>, String)>()

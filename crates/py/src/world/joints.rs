@@ -7,15 +7,15 @@ use crate::objects::builder::pair;
 use crate::objects::joint::Joint;
 use crate::objects::joint_dof;
 use crate::objects::joints::{component, drive_at};
-use crate::objects::place::{Place, by_name};
-use crate::world::add::own_place;
+use crate::objects::place::Place;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
+use crate::world::target::target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
+use tumble::dynamics::{DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
 
 /// The arguments of ``add_joint``.
 pub struct Arguments<'a, 'py> {
@@ -158,36 +158,13 @@ fn center(inner: &Inner, id: ObjectId, part: usize) -> Option<Vec3> {
     state.map(|state| state.position())
 }
 
-/// Converts a handle, a name, ``"ARTICULATION/LINK"``, or a tuple of an articulation and the name of a
-/// link.
+/// Returns the object and the part that an argument names.
 fn side(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, usize)> {
-    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
-        let place = own_place(shared, &body)?;
-        return link_part(shared, &place, &link);
-    }
-    if let Ok(name) = value.extract::<String>()
-        && let Some((object, link)) = name.split_once('/')
-        && shared.read(|inner| Ok(inner.world.find(&name).is_none()))?
-    {
-        let found = shared.read(|inner| by_name(inner, object))?;
-        return link_part(shared, &Place { shared: shared.clone(), id: found.id, name: object.into() }, link);
-    }
-    let place = own_place(shared, value)?;
-    match place.read(|inner| Some(inner.world.get::<ArticulatedBody>(place.id).is_some()))? {
-        false => Ok((place.id, 0)),
-        true => Err(Error::value(format!(
-            "'{0}' is an articulation; name a link of it: \"{0}/LINK\", or (articulation, \"LINK\")",
-            place.name
-        ))),
-    }
-}
-
-fn link_part(shared: &Arc<Shared>, place: &Place, link: &str) -> Result<(ObjectId, usize)> {
+    let target = target(shared, value)?;
     shared.read(|inner| {
-        let body = inner.world.get::<ArticulatedBody>(place.id);
-        let frame = body.and_then(|body| Some(body.model().frame(link)?.link.unwrap_or(body.model().links().len())));
-        let part = frame.ok_or_else(|| Error::Name(format!("'{}' has no link named '{link}'", place.name)))?;
-        Ok((place.id, part))
+        let Some((body, link)) = target.link(inner)? else { return Ok((target.id, 0)) };
+        let moving = body.model().frame(link).and_then(|frame| frame.link);
+        Ok((target.id, moving.unwrap_or(body.model().links().len())))
     })
 }
 

@@ -5,8 +5,9 @@ use crate::objects::mimic::Mimic;
 use crate::objects::place::Place;
 use crate::world::inner::Inner;
 use crate::world::joints;
-use crate::world::sensors::{self, Target};
+use crate::world::sensors;
 use crate::world::shared::Shared;
+use crate::world::target::{Target, target};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::dynamics::{JointRef, Mimic as Core, ObjectId};
@@ -22,7 +23,7 @@ impl Named {
     fn of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Named> {
         match joints::place_of(shared, value)? {
             Some(place) => Ok(Named::LoopJoint(place.id)),
-            None => sensors::target(shared, value).map(Named::Link),
+            None => target(shared, value).map(Named::Link),
         }
     }
 

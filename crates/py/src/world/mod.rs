@@ -21,3 +21,4 @@ pub mod sensors;
 pub mod shared;
 pub mod simulate;
 pub mod snapshot;
+pub mod target;

@@ -1,10 +1,9 @@
 //! Restitution and friction of pairs: the combination rules by name, and constants of single pairs.
 
 use crate::errors::{Error, Result};
-use crate::objects::place::by_name;
-use crate::world::add::own_place;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
+use crate::world::target::target;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::dynamics::{ArticulatedBody, Combine, ObjectId, PairMaterial, PairSide};
@@ -37,27 +36,15 @@ impl Side {
     }
 }
 
-/// Converts a handle, a name, or ``"ARTICULATION/LINK"``.
+/// Converts what names an object or a link with shapes.
 fn side(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Side> {
-    if let Ok(name) = value.extract::<String>()
-        && let Some((object, link)) = name.split_once('/')
-        && shared.read(|inner| Ok(inner.world.find(&name).is_none()))?
-    {
-        return shared.read(|inner| link_side(inner, object, link));
+    let target = target(shared, value)?;
+    let parts = shared.read(|inner| target.parts(inner))?;
+    if parts.as_ref().is_some_and(Vec::is_empty) {
+        let link = target.link.unwrap_or_default();
+        return Err(Error::value(format!("link '{link}' has no shape that collides")));
     }
-    Ok(Side { id: own_place(shared, value)?.id, parts: None })
-}
-
-fn link_side(inner: &Inner, object: &str, link: &str) -> Result<Side> {
-    let id = by_name(inner, object)?.id;
-    let body = inner.world.get::<ArticulatedBody>(id);
-    let Some(parts) = body.and_then(|body| body.parts_of_link(link).ok()) else {
-        return Err(Error::Name(format!("'{object}' has no link named '{link}'")));
-    };
-    match parts.is_empty() {
-        true => Err(Error::value(format!("link '{link}' of '{object}' has no shape that collides"))),
-        false => Ok(Side { id, parts: Some(parts) }),
-    }
+    Ok(Side { id: target.id, parts })
 }
 
 /// Sets the constants of a pair.

@@ -2,13 +2,12 @@
 
 use crate::arrays::convert::{Numbers, number, numbers, pose, shown, vec3};
 use crate::errors::{Error, Result};
-use crate::objects::link::Link;
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
-use crate::world::add::own_place;
 use crate::world::contacts::{link, shape_number};
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
+use crate::world::target::target;
 use nalgebra::Translation3;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -122,36 +121,10 @@ fn without(filter: QueryFilter, (id, parts): (ObjectId, Option<Vec<usize>>)) -> 
     }
 }
 
-/// Converts a body, or a link: a handle, ``"ARTICULATION/LINK"`` or (articulation, link), with the parts that are its shapes.
+/// Converts what names a body or a link, with the parts that are the shapes of the link.
 fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Option<Vec<usize>>)> {
-    let of_link = |id: ObjectId, link: &str| {
-        let parts = shared.read(|inner| {
-            let body = inner.world.get::<ArticulatedBody>(id);
-            body.map(|body| Ok(body.parts_of_link(link)?)).unwrap_or_else(|| {
-                Err(Error::Name(format!("'{}' has no link '{link}'", inner.world.name(id).unwrap_or_default())))
-            })
-        })?;
-        Ok((id, Some(parts)))
-    };
-    if let Ok(link) = value.cast::<Link>() {
-        return of_link(own_place(shared, link.get().articulation().bind(value.py()).as_any())?.id, link.get().name());
-    }
-    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
-        return match own_place(shared, &body)? {
-            place if shared.read(|inner| Ok(inner.world.get::<ArticulatedBody>(place.id).is_some()))? => {
-                of_link(place.id, &link)
-            }
-            _ => Err(Error::value("expected an articulation before the name of a link")),
-        };
-    }
-    if let Ok(name) = value.extract::<String>()
-        && let Some((object, link)) = name.rsplit_once('/')
-        && let Some(id) =
-            shared.read(|inner| Ok(inner.world.find(object).filter(|_| inner.world.find(&name).is_none())))?
-    {
-        return of_link(id, link);
-    }
-    own_place(shared, value).map(|place| (place.id, None))
+    let target = target(shared, value)?;
+    Ok((target.id, shared.read(|inner| target.parts(inner))?))
 }
 
 /// Converts the number of a collision group.

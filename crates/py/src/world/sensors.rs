@@ -3,22 +3,21 @@
 use crate::arrays::convert::{number, pose};
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
-use crate::objects::place::{Place, by_name};
+use crate::objects::place::Place;
 use crate::objects::sensor::Sensor;
 use crate::objects::shapes::Shape;
-use crate::world::add::own_place;
 use crate::world::inner::Inner;
 use crate::world::joints;
 use crate::world::query::Numbering;
 use crate::world::shared::Shared;
+use crate::world::target::{self, Target};
 use nalgebra::Translation3;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use tumble::collide::Pose;
 use tumble::dynamics::{
-    Anchor, ArticulatedBody, ObjectId, Optics, RigidBody as Rigid, Sensor as Core, SensorImage, SensorKind,
-    SensorNoise, SensorPlace,
+    Anchor, ObjectId, Optics, RigidBody as Rigid, Sensor as Core, SensorImage, SensorKind, SensorNoise, SensorPlace,
 };
 
 /// The arguments of ``add_sensor``.
@@ -36,12 +35,6 @@ pub struct Arguments<'a, 'py> {
     pub vertical_fov: Option<f64>,
 }
 
-/// A body, and the name of a link of it.
-pub struct Target {
-    pub id: ObjectId,
-    pub link: Option<String>,
-}
-
 /// Adds a sensor and returns its handle.
 pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> Result<Sensor> {
     let kinds: Vec<(&str, SensorKind)> = SensorKind::NAMES.into_iter().zip(SensorKind::ALL).collect();
@@ -49,10 +42,10 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     let site = pose(given.position, given.orientation)?;
     let joint = given.on.map_or(Ok(None), |on| joints::place_of(shared, on))?;
     let target = match given.on.filter(|_| joint.is_none()) {
-        Some(on) => Some(target(shared, on)?),
+        Some(on) => Some(target::target(shared, on)?),
         None => None,
     };
-    let reference = given.relative_to.map(|value| self::target(shared, value)).transpose()?;
+    let reference = given.relative_to.map(|value| target::target(shared, value)).transpose()?;
     let volume = match given.volume.map(|volume| volume.get()) {
         Some(volume) if volume.placement != Pose::identity() => {
             return Err(Error::value("volume: expected a sphere, a box, a capsule or a cylinder"));
@@ -90,36 +83,8 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     Sensor::new(py, place)
 }
 
-/// Converts a handle, a name, ``"ARTICULATION/LINK"``, or a tuple of an articulation and the name of a link.
-pub fn target(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Target> {
-    if let Ok((body, link)) = value.extract::<(Bound<'_, PyAny>, String)>() {
-        return Ok(Target { id: own_place(shared, &body)?.id, link: Some(link) });
-    }
-    if let Ok(name) = value.extract::<String>()
-        && let Some((object, link)) = name.split_once('/')
-        && shared.read(|inner| Ok(inner.world.find(&name).is_none()))?
-    {
-        let found = shared.read(|inner| by_name(inner, object))?;
-        return Ok(Target { id: found.id, link: Some(link.into()) });
-    }
-    Ok(Target { id: own_place(shared, value)?.id, link: None })
-}
-
-/// Returns the articulated body and the link that a target names.
-fn link<'a>(inner: &'a Inner, target: &'a Target) -> Result<Option<(&'a ArticulatedBody, &'a str)>> {
-    let name = inner.world.name(target.id).unwrap_or_default();
-    match (inner.world.get::<ArticulatedBody>(target.id), &target.link) {
-        (Some(body), Some(link)) => Ok(Some((body, link.as_str()))),
-        (None, None) => Ok(None),
-        (Some(_), None) => Err(Error::value(format!(
-            "'{name}' is an articulation; name a link of it: \"{name}/LINK\", or (articulation, \"LINK\")"
-        ))),
-        (None, Some(link)) => Err(Error::Name(format!("'{name}' has no link named '{link}'"))),
-    }
-}
-
 fn anchor(inner: &Inner, target: &Target, site: &Pose) -> Result<Anchor> {
-    match link(inner, target)? {
+    match target.link(inner)? {
         Some((body, link)) => body.anchor(target.id, link, site).map_err(|e| Error::Name(e.to_string())),
         None => {
             // the frame of a body is that of its shape
@@ -138,7 +103,7 @@ pub fn dof_of(inner: &Inner, target: &Target, argument: &str) -> Result<(ObjectI
             "{argument}: expected a link that a revolute or prismatic joint of its own moves, or a loop joint, got '{name}{link}'"
         ))
     };
-    let (body, link) = link(inner, target)?.ok_or_else(|| none(""))?;
+    let (body, link) = target.link(inner)?.ok_or_else(|| none(""))?;
     let model = body.model();
     model.frame(link).ok_or_else(|| Error::Name(format!("'{name}' has no link named '{link}'")))?;
     let moving = model.link(link).map(|k| &model.links()[k]).filter(|link| link.joint.dof() == 1);
