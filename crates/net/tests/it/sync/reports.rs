@@ -327,8 +327,8 @@ fn sensors_that_a_program_adds_are_sent() {
             assert_eq!(mirror.hash(), published.hash, "frame {frame}");
             assert_eq!(readings(mirror.world()), readings(&world), "frame {frame}");
             let count = match frame {
-                ..10 => 2,
-                ..40 => 6,
+                0..10 => 2,
+                10..40 => 6,
                 _ => 5,
             };
             assert_eq!(readings(mirror.world()).len(), count, "frame {frame}");
