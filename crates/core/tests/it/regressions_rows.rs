@@ -335,18 +335,13 @@ fn spin_pinned_rod(stepper: &str, dt: f64) -> Spun {
 }
 
 fn assert_pin_holds(stepper: &str) {
-    let [coarse, middle, fine] = [240.0, 480.0, 960.0].map(|rate| spin_pinned_rod(stepper, 1.0 / rate));
-    // no work is done: a thousandth in two seconds is far more than the 5e-5 of a second-order
-    // method at this step
-    assert!(coarse.energy < 1e-3, "{stepper}: energy off by {:e} at 1/240", coarse.energy);
-    for spun in [&coarse, &middle, &fine] {
+    for rate in [240.0, 480.0, 960.0] {
+        let spun = spin_pinned_rod(stepper, 1.0 / rate);
+        // joints do no work at any step; the rest is that of ends which are closed to 1e-9 m
+        assert!(spun.energy < 1e-8, "{stepper}: energy off by {:e} at 1/{rate}", spun.energy);
         // joints are closed to 1e-9 m and 1e-9 m/s along each axis
         assert!(spun.drift < 3f64.sqrt() * 1e-9, "{stepper}: drift {:e} m", spun.drift);
         assert!(spun.speed < 3f64.sqrt() * 1e-9, "{stepper}: the end moves at {:e} m/s", spun.speed);
-    }
-    // second order: half the step, a quarter of the error (a tenth more for terms of higher order)
-    for (a, b) in [(&coarse, &middle), (&middle, &fine)] {
-        assert!(b.energy < 0.275 * a.energy, "{stepper}: energy {:e}, at half the step {:e}", a.energy, b.energy);
     }
 }
 

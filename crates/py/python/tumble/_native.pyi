@@ -1533,7 +1533,7 @@ class ArticulationBuilder:
 
 @final
 class Link:
-    """A link of an articulation: its mass, and what its shapes collide with.
+    """A link of an articulation: its motion, its mass, and what its shapes collide with.
 
     ``Articulation.link`` returns it, also for a fixed link. A handle without data of its own. It can be changed if the
     articulation is in a world.
@@ -1582,16 +1582,16 @@ class Link:
     def mask(self, value: int | Sequence[int] | None) -> None: ...
     @property
     def position(self) -> _Floats:
-        """."""
+        """Position of the origin of its frame, shape (3,), meters, world axes."""
     @property
     def orientation(self) -> _Floats:
-        """."""
+        """Orientation, link to world, unit quaternion (x, y, z, w), shape (4,)."""
     @property
     def velocity(self) -> _Floats:
-        """."""
+        """Velocity of the origin of its frame, shape (3,), m/s, world axes."""
     @property
     def angular_velocity(self) -> _Floats:
-        """."""
+        """Angular velocity, shape (3,), rad/s, world axes."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def attach_camera(
