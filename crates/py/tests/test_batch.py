@@ -195,7 +195,7 @@ def test_a_world_that_fails_is_named_and_the_others_step(arm_world):
         (lambda b: b.step(np.zeros((2, 6))), r"controls: expected shape \(6,\) or \(3, 6\), got \(2, 6\)"),
         (lambda b: b.step([np.nan] * 6), "controls: number 0 is NaN"),
         (lambda b: b.step(targets=np.zeros(5)), r"targets: expected shape \(6,\) or \(3, 6\), got \(5,\)"),
-        (lambda b: b.step(substeps=-1), "expected a non-negative integer"),
+        (lambda b: b.step(substeps=-1), "substeps is -1; expected a whole number from 1 to 1000"),
         (lambda b: b.step(mask=[True]), r"mask: expected booleans, shape \(3,\)"),
         (lambda b: b.reset(np.zeros((3, 1), bool)), r"mask: expected booleans"),
         (lambda b: b.reset(state=np.zeros(3)), r"state: expected shape \(38,\) or \(3, 38\)"),
