@@ -91,9 +91,9 @@ table! {
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
-    arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "0a969de1ea7a6a2f";
+    arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "da88b3337864b3ba";
     walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "59df4c2f9a2ee4b5";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "2847922cfda70dba";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "0eefe21dc7e9d4c9";
     mechanism_time_stepping: "mechanism", TimeStepping, "d043312e0750f202", "1313d8bed5f97817";
     dominoes_time_stepping: "dominoes", TimeStepping, "58576a2f35779e99", "55045ae3c13bd4d5";
 }

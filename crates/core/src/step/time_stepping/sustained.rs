@@ -17,7 +17,8 @@ use crate::world::Core;
 
 impl TimeStepping {
     /// Writes the change of whitened velocity by what holds bodies after an impact to `buffers.sustained`, after the
-    /// solve of the step. `du_force` is the change by forces. A step with a budget has one solve, and nothing is written.
+    /// solve of the step. `du_force` is the change by forces. A step with a budget has one solve, and a frame in which a
+    /// solve did not converge takes no further one, whose difference would mean little: then all is zero.
     pub(super) fn find_sustained(&mut self, core: &mut Core, settings: SolverSettings, du_force: &[f64]) {
         let (work, fraction) = (&mut self.work, &self.impact_fraction);
         let Buffers { keep, sustained, .. } = &mut self.buffers;
@@ -30,7 +31,8 @@ impl TimeStepping {
             .map(|(block, keep)| *keep && block.sides().iter().any(|side| fraction[side.u as usize] >= 0.0))
             .collect();
         let holds = |(block, struck): (&Block, &bool)| *struck && work.lambda[block.row as usize] != 0.0;
-        if settings.budget.is_some() || !work.rows.blocks.iter().zip(&struck).any(holds) {
+        let single = settings.budget.is_some() || core.report.unconverged > 0;
+        if single || !work.rows.blocks.iter().zip(&struck).any(holds) {
             return;
         }
         let rest = |i: usize| if fraction[i] >= 0.0 { (1.0 - fraction[i]) * du_force[i] } else { 0.0 };

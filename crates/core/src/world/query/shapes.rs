@@ -108,7 +108,7 @@ impl World {
     /// [`WorldError::Stale`] if an object was removed.
     ///
     /// ```
-    /// use tumble_core::prelude::*;
+    /// use tumble_core::{ArticulationBuilder, LinkBuilder, prelude::*};
     /// let mut world = World::default();
     /// let part = |x: f64| Collider::new(Shape::sphere(0.5).unwrap(), Pose::translation(x, 0.0, 0.0));
     /// let upper = LinkBuilder::new("upper", Joint::revolute(Vec3::z())).with_mass(1.0).with_collider(part(0.0));
