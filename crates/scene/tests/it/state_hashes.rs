@@ -50,22 +50,22 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "8f01ac981dbda08f", "35727a0afefe7dab";
     billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "796e476f8b89b1fe";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "776f07798a9fa358";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "b642e6824b667564";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5c90c707c04aaf44";
     chain_time_stepping: "chain", TimeStepping, "bbceab106cefb143", "017c9dc6970cad04";
     chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
-    falling_time_stepping: "falling", TimeStepping, "229ea17898f61b35", "5f0ec95b7bd58321";
+    falling_time_stepping: "falling", TimeStepping, "229ea17898f61b35", "f0dfabe735f7a2cc";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "16303bc1a22ef780";
+    falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "aa894d9cb8e3cf07";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
-    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "86827907c5004d83";
-    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "4283276950da9bc5";
+    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "f3d2566244a33458";
+    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c82ac5e456d8f016";
     skeleton_time_stepping: "skeleton", TimeStepping, "6a25cfcb500df86a", "55fd41b6b46116e2";
     skeleton_backtracking: "skeleton", Backtracking, "ca2fb3da08c0a460", "09b1ab65352375a7";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
@@ -85,17 +85,17 @@ table! {
     campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "4550f80d0dcd8828";
+    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "5b143390393d7fa5";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "087f72ba625bf535";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
     arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "da88b3337864b3ba";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "59df4c2f9a2ee4b5";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "0eefe21dc7e9d4c9";
-    mechanism_time_stepping: "mechanism", TimeStepping, "d043312e0750f202", "1313d8bed5f97817";
-    dominoes_time_stepping: "dominoes", TimeStepping, "58576a2f35779e99", "55045ae3c13bd4d5";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "5a92b18e025f41b9";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "b3ea27ad35754290";
+    mechanism_time_stepping: "mechanism", TimeStepping, "9495d2cfa387718e", "83d988890d7050c9";
+    dominoes_time_stepping: "dominoes", TimeStepping, "5a5e6140fbf8e47e", "74fe06e90e02a20a";
 }
 
 table! {
@@ -106,6 +106,6 @@ table! {
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
-    mechanism_backtracking: "mechanism", Backtracking, "d5ef236f360508d5", "e3c044e3a202c7b1";
+    mechanism_backtracking: "mechanism", Backtracking, "45f0dd6e992ac31c", "1890656b20974f80";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6ee8cd1aa8618179", "c32e6609d8484d51";
 }
