@@ -1,4 +1,4 @@
-//! What an argument names: an object, or a link of an articulation.
+//! Objects and links that arguments name.
 
 use crate::errors::{Error, Result};
 use crate::objects::link::Link;
