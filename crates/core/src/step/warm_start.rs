@@ -14,8 +14,7 @@ const SAME_PLACE: f64 = 1e-5;
 
 /// Sets multipliers of contacts to the forces of the last sub-step, in the present contact frames, times
 /// `scale`. Contacts that are gone leave their force to a new one at their place, else force and torque to those of
-/// their pair that touch.
-/// The solver projects the multipliers onto the cone.
+/// their pair that touch. The solver projects the multipliers onto the cone.
 pub(crate) fn warm_start(core: &Core, work: &mut Workspace, scale: f64) {
     let (mut place, mut first) = (0, 0);
     let (mut forces, mut known, mut lost, mut points) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

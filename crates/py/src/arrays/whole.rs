@@ -50,9 +50,7 @@ macro_rules! names {
     ($($name:ident $(: $expected:literal)?,)+) => { $(
         #[doc = concat!("Converts the argument `", stringify!($name), "`.")]
         pub fn $name<T: Whole>(value: &Bound<'_, PyAny>) -> PyResult<T> {
-            #[allow(unused_mut, unused_assignments, reason = "a name may have a range of its own")]
-            let mut expected = T::EXPECTED;
-            $(expected = $expected;)?
+            let [.., expected] = [T::EXPECTED $(, $expected)?];
             named(value, stringify!($name), expected)
         }
     )+ };
