@@ -41,7 +41,7 @@ use stage::Textures;
 use std::sync::{Arc, Mutex, PoisonError};
 use targets::{ShadowMaps, Targets};
 use textures::TextureCache;
-pub use window::{Screen, Shown};
+pub use window::{Screen, Shown, Wall};
 
 /// Targets of several sizes are kept while they have at most this many pixels in total.
 const KEPT_PIXELS: u64 = 8 << 20;

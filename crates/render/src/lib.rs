@@ -51,7 +51,7 @@ pub use facet::{
 pub use gpu::{
     FreeParticle, FreeParticles, GlslProgram, GlslTranslator, GpuParticles, MAX_OBSTACLES, MAX_PARTICLES, Obstacle,
     ObstacleShape, PortableDraw, PortableItems, PortableKey, PortablePicture, PortableView, Precision, Reading, Recipe,
-    Renderer, Screen, Shown, Stage, portable_pass_wgsl, portable_wgsl,
+    Renderer, Screen, Shown, Stage, Wall, portable_pass_wgsl, portable_wgsl,
 };
 pub use image::Image;
 pub use list::{
@@ -64,7 +64,7 @@ pub use mesh::{MAX_MESH_VERTICES, MeshData};
 pub use sliders::{Slider, SliderPanel};
 pub use viewer::{ViewError, Viewer, view, view_with};
 pub use viewpoint::{Lens, Part, Viewpoint};
-pub use window::{Next, WindowApp, WindowOptions, run_window};
+pub use window::{Mailbox, Next, WallApp, WallLoop, WindowApp, WindowOptions, run_window};
 pub use winit;
 
 /// Longest side of a picture, pixels; a device may allow less.

@@ -1,14 +1,17 @@
 //! A window that runs an application: opening, events, timing, end. The application decides what
 //! the window shows ([`WindowApp`]).
 //!
-//! A process has at most one window, because the window library allows one event loop.
+//! A process has one such window, or several with one device ([`WallLoop`]), because the window library
+//! allows one event loop.
 
 mod monitor;
+mod wall;
 
 use crate::RenderError;
 use crate::gpu::Screen;
 use std::sync::Arc;
 use std::time::Instant;
+pub use wall::{Mailbox, WallApp, WallLoop};
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::WindowEvent;
@@ -103,18 +106,54 @@ pub trait WindowApp {
 /// [`RenderError::NoWindow`] without a desktop, [`RenderError::BadSize`],
 /// [`RenderError::NoAdapter`], [`RenderError::Device`], and the application's own errors.
 pub fn run_window<A: WindowApp>(options: &WindowOptions, app: &mut A) -> Result<(), A::Error> {
-    let refused = |reason: String| RenderError::NoWindow { reason };
+    check_size(options)?;
+    let event_loop = EventLoop::new().map_err(|e| no_desktop(&e))?;
+    let mut host = Host { options, app, screen: None, next: Next::At(Instant::now()), outcome: Ok(()) };
+    let ended = event_loop.run_app(&mut host);
+    host.outcome?;
+    ended.map_err(|e| RenderError::NoWindow { reason: e.to_string() }.into())
+}
+
+/// Returns the error of an event loop that cannot begin.
+fn no_desktop(error: &winit::error::EventLoopError) -> RenderError {
+    RenderError::NoWindow { reason: tried(without_place(&error.to_string())) }
+}
+
+/// Checks the size of a window's content.
+fn check_size(options: &WindowOptions) -> Result<(), RenderError> {
     let [width, height] = options.size_px;
     let (max_side, max_pixels) = (crate::MAX_SIDE, crate::MAX_PIXELS);
     let sides = 1..=max_side;
     if !sides.contains(&width) || !sides.contains(&height) || u64::from(width) * u64::from(height) > max_pixels {
-        return Err(RenderError::BadSize { width, height, max_side, max_pixels }.into());
+        return Err(RenderError::BadSize { width, height, max_side, max_pixels });
     }
-    let event_loop = EventLoop::new().map_err(|e| refused(tried(without_place(&e.to_string()))))?;
-    let mut host = Host { options, app, screen: None, next: Next::At(Instant::now()), outcome: Ok(()) };
-    let ended = event_loop.run_app(&mut host);
-    host.outcome?;
-    ended.map_err(|e| refused(e.to_string()).into())
+    Ok(())
+}
+
+/// Opens a window as its options say.
+fn create(event_loop: &ActiveEventLoop, options: &WindowOptions) -> Result<Arc<Window>, RenderError> {
+    let [width, height] = options.size_px;
+    let mut wanted = Window::default_attributes()
+        .with_title(&options.title)
+        .with_inner_size(PhysicalSize::new(width, height))
+        .with_decorations(options.decorated)
+        .with_resizable(options.resizable);
+    let monitor = monitor::find(event_loop, options)?;
+    let corner = monitor.as_ref().map_or(PhysicalPosition::default(), MonitorHandle::position);
+    let position = if options.full_screen { Some([0, 0]) } else { options.position_px };
+    if let Some([x, y]) = position {
+        wanted = wanted.with_position(PhysicalPosition::new(corner.x + x, corner.y + y));
+    }
+    if options.full_screen {
+        // a desktop without a window manager takes position and size alone
+        let covered = match monitor::video_mode(monitor.as_ref(), options)? {
+            Some(mode) => Fullscreen::Exclusive(mode),
+            None => Fullscreen::Borderless(monitor),
+        };
+        wanted = wanted.with_decorations(false).with_fullscreen(Some(covered));
+    }
+    let window = event_loop.create_window(wanted).map_err(|e| RenderError::NoWindow { reason: e.to_string() })?;
+    Ok(Arc::new(window))
 }
 
 /// Removes the source line of the window library from its message.
@@ -155,29 +194,9 @@ impl<A: WindowApp> Host<'_, A> {
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<(), A::Error> {
-        let [width, height] = self.options.size_px;
-        let mut wanted = Window::default_attributes()
-            .with_title(&self.options.title)
-            .with_inner_size(PhysicalSize::new(width, height))
-            .with_decorations(self.options.decorated)
-            .with_resizable(self.options.resizable);
-        let monitor = monitor::find(event_loop, self.options)?;
-        let corner = monitor.as_ref().map_or(PhysicalPosition::default(), MonitorHandle::position);
-        let position = if self.options.full_screen { Some([0, 0]) } else { self.options.position_px };
-        if let Some([x, y]) = position {
-            wanted = wanted.with_position(PhysicalPosition::new(corner.x + x, corner.y + y));
-        }
-        if self.options.full_screen {
-            // a desktop without a window manager takes position and size alone
-            let covered = match monitor::video_mode(monitor.as_ref(), self.options)? {
-                Some(mode) => Fullscreen::Exclusive(mode),
-                None => Fullscreen::Borderless(monitor),
-            };
-            wanted = wanted.with_decorations(false).with_fullscreen(Some(covered));
-        }
-        let window = event_loop.create_window(wanted).map_err(|e| RenderError::NoWindow { reason: e.to_string() })?;
+        let window = create(event_loop, self.options)?;
         let adapter = self.options.adapter.as_deref();
-        let screen = self.screen.insert(Screen::new(event_loop, Arc::new(window), adapter)?);
+        let screen = self.screen.insert(Screen::new(event_loop, window, adapter)?);
         self.app.opened(screen)
     }
 

@@ -303,7 +303,7 @@ pub struct DrawOptions {
 #[command(next_help_heading = "Web browsers")]
 pub struct WebOptions {
     /// Show facets in web browsers: each facet of this machine serves a page at this address, the next one at
-    /// the next port. The link of each is printed.
+    /// the next port, process by process. The link of each is printed.
     #[arg(long, value_name = "ADDR:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:47400")]
     #[arg(conflicts_with_all = ["preview", "no_pictures", "burn_in"])]
     pub web: Option<SocketAddr>,
@@ -334,8 +334,8 @@ pub struct CaveOptions {
     /// per facet.
     #[arg(long)]
     pub preview: bool,
-    /// Draw all facets of a machine with one graphics adapter in one process, into memory, instead of one
-    /// process per facet (default: as `process` in the cave file says).
+    /// Draw all facets of a machine with one graphics adapter in one process, instead of one process per facet
+    /// (default: as `process` in the cave file says).
     #[arg(long, conflicts_with = "preview")]
     pub one_process: bool,
     /// Restart a facet that ended by itself or was killed, at most 5 times in a minute.
@@ -402,7 +402,7 @@ pub struct FacetOptions {
     #[arg(long, hide = true, value_name = "N")]
     pub disturb_after: Option<u64>,
     /// Name of the facet in the cave. Several names, separated by commas, are drawn by this process
-    /// together, into memory: with one device and one copy of the world.
+    /// together: with one device and one copy of the world.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', required_unless_present = "preview")]
     pub facet: Vec<String>,
     /// Draw all facets in one picture, for a server started with --preview.

@@ -98,31 +98,7 @@ impl ViewMode {
     /// Returns the line of sight through a pixel, for an anaglyph that of the left eye; `None` if
     /// nothing is shown there.
     pub fn ray(&self, list: &DrawList, size_px: [u32; 2], at_px: [f64; 2]) -> Option<Ray> {
-        let tiles = self.tiles(list, size_px).ok()?;
-        let within = |t: &&Tile| {
-            (0..2).all(|k| (0.0..f64::from(t.size_px[k])).contains(&(at_px[k] - f64::from(t.position_px[k]))))
-        };
-        let tile = tiles.iter().find(within)?;
-        let share: [f64; 2] =
-            std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
-        let share: [f64; 2] = std::array::from_fn(|k| if tile.flip[k] { 1.0 - share[k] } else { share[k] });
-        let from = match &tile.from {
-            From::Flat(from) => from,
-            From::Curved(view, facet, side) => {
-                let (origin, direction) = view.sight(facet, *side, share)?;
-                let (_, axis) = view.sight(facet, *side, [0.5; 2])?;
-                return Some(Ray { origin: origin.coords, direction, axis });
-            }
-        };
-        let lens = from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
-        let back = (lens.projection * lens.view).try_inverse()?;
-        let at = |depth: f64| {
-            back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords
-        };
-        let (near, far) = (at(0.0), at(0.5));
-        let rotation = lens.view.fixed_view::<3, 3>(0, 0).transpose();
-        let origin = -(rotation * lens.view.fixed_view::<3, 1>(0, 3));
-        Some(Ray { origin, direction: (far - near).try_normalize(1e-12)?, axis: -rotation.column(2).into_owned() })
+        ray(&self.tiles(list, size_px).ok()?, at_px)
     }
 
     fn tiles<'a>(&'a self, list: &DrawList, size_px: [u32; 2]) -> Result<Vec<Tile<'a>>, RenderError> {
@@ -141,6 +117,38 @@ impl ViewMode {
             }
         })
     }
+}
+
+/// Returns the line of sight through a pixel of a facet's picture, as [`ViewMode::ray`] does.
+pub fn facet_ray(view: &CaveView, facet: &Facet, at_px: [f64; 2]) -> Option<Ray> {
+    ray(&eyes(view, facet).ok()?, at_px)
+}
+
+/// Returns the line of sight through a pixel of tiles.
+fn ray(tiles: &[Tile], at_px: [f64; 2]) -> Option<Ray> {
+    let within =
+        |t: &&Tile| (0..2).all(|k| (0.0..f64::from(t.size_px[k])).contains(&(at_px[k] - f64::from(t.position_px[k]))));
+    let tile = tiles.iter().find(within)?;
+    let share: [f64; 2] =
+        std::array::from_fn(|k| (at_px[k] - f64::from(tile.position_px[k])) / f64::from(tile.size_px[k]));
+    let share: [f64; 2] = std::array::from_fn(|k| if tile.flip[k] { 1.0 - share[k] } else { share[k] });
+    let from = match &tile.from {
+        From::Flat(from) => from,
+        From::Curved(view, facet, side) => {
+            let (origin, direction) = view.sight(facet, *side, share)?;
+            let (_, axis) = view.sight(facet, *side, [0.5; 2])?;
+            return Some(Ray { origin: origin.coords, direction, axis });
+        }
+    };
+    let lens = from.lens(tile.size_px[0] as f32 / tile.size_px[1] as f32).ok()?;
+    let back = (lens.projection * lens.view).try_inverse()?;
+    let at = |depth: f64| {
+        back.transform_point(&nalgebra::Point3::new(2.0 * share[0] - 1.0, 1.0 - 2.0 * share[1], depth)).coords
+    };
+    let (near, far) = (at(0.0), at(0.5));
+    let rotation = lens.view.fixed_view::<3, 3>(0, 0).transpose();
+    let origin = -(rotation * lens.view.fixed_view::<3, 1>(0, 3));
+    Some(Ray { origin, direction: (far - near).try_normalize(1e-12)?, axis: -rotation.column(2).into_owned() })
 }
 
 /// Returns the views of a facet in their rectangles: one per eye, or one from between the eyes.

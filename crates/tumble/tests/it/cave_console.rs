@@ -10,7 +10,7 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 /// Returns address and token of the run's console; waits for them.
-fn link(place: &Place) -> (SocketAddr, String) {
+pub fn link(place: &Place) -> (SocketAddr, String) {
     wait("the console", || run_info(&place.folder)["console"].is_object());
     let console = run_info(&place.folder)["console"].clone();
     (console["address"].as_str().unwrap().parse().unwrap(), console["token"].as_str().unwrap().to_owned())
@@ -27,21 +27,21 @@ fn exchange(at: SocketAddr, bytes: &[u8]) -> String {
 }
 
 /// Asks with a token; returns the status code and the body.
-fn ask(at: SocketAddr, token: &str, method: &str, path: &str) -> (u16, String) {
+pub fn ask(at: SocketAddr, token: &str, method: &str, path: &str) -> (u16, String) {
     let request = format!("{method} {path} HTTP/1.1\r\nHost: {at}\r\nAuthorization: Bearer {token}\r\n\r\n");
     let answer = exchange(at, request.as_bytes());
     let (head, body) = answer.split_once("\r\n\r\n").unwrap_or((&answer, ""));
     (head.get(9..12).and_then(|code| code.parse().ok()).unwrap_or(0), body.to_owned())
 }
 
-fn status(at: SocketAddr, token: &str) -> Value {
+pub fn status(at: SocketAddr, token: &str) -> Value {
     let (code, body) = ask(at, token, "GET", "/api/status");
     assert_eq!(code, 200, "{body}");
     serde_json::from_str(&body).unwrap()
 }
 
 /// Runs `tumble console ADDR WORDS`; returns exit code, stdout and stderr.
-fn console(place: &Place, at: SocketAddr, words: &[&str]) -> (Option<i32>, String, String) {
+pub fn console(place: &Place, at: SocketAddr, words: &[&str]) -> (Option<i32>, String, String) {
     let at = at.to_string();
     let mut command = in_place(&place.folder, &[&["console", &at], words].concat());
     let out = command.stdin(Stdio::null()).output().unwrap();

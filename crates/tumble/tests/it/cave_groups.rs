@@ -6,26 +6,27 @@ use crate::common::*;
 use rustix::process::Signal;
 use serde_json::Value;
 
-const NAMES: [&str; 4] = ["front", "left", "right", "floor"];
+pub const NAMES: [&str; 4] = ["front", "left", "right", "floor"];
 
 /// The room, whose facets differ in what finishes their pictures, and are in these processes.
-fn room(processes: [Option<&str>; 4]) -> String {
+pub fn room(processes: [Option<&str>; 4]) -> String {
     let keys = ["stereo = \"side_by_side\"", "flip = \"horizontal\"", "stereo = \"rows\"", ""];
     let facet = |k: usize| {
+        let left = [0, 170, 260, 350][k];
         let process = processes[k].map_or(String::new(), |name| format!("process = \"{name}\"\n"));
-        format!("size_px = [80, 80]\n{}\n{process}", keys[k])
+        format!("size_px = [80, 80]\nposition_px = [{left}, 20]\n{}\n{process}", keys[k])
     };
     let sync = "ready_timeout_ms = 2000\ndrop_timeout_ms = 2000\nconnect_timeout_ms = 60000";
     cave_of(&ROOM, facet, sync)
 }
 
 /// The frame, the state and the picture of each line, without times.
-fn lines(log: &[Value]) -> Vec<[&Value; 4]> {
+pub fn lines(log: &[Value]) -> Vec<[&Value; 4]> {
     log.iter().map(|line| ["frame", "time_s", "state", "image"].map(|key| &line[key])).collect()
 }
 
 /// Every facet has shown each frame once, in time.
-fn assert_whole(summary: &Value, frames: u64) {
+pub fn assert_whole(summary: &Value, frames: u64) {
     for facet in summary["facets"].as_array().unwrap() {
         for zero in ["late", "missing", "torn", "mismatched", "dropped", "refused", "not_shown", "not_written"] {
             assert_eq!(facet[zero], 0, "{zero} of {facet}");
@@ -135,5 +136,12 @@ fn groups_that_cannot_be_are_refused() {
     };
     refused(&["--facet", "front,ceiling", "--no-pictures"], "ceiling");
     refused(&["--facet", "front,left,front", "--no-pictures"], "front is named twice");
-    refused(&["--facet", "front,left", "--web", "127.0.0.1:0"], "a process each (--web)");
+    refused(&["--facet", "front,left", "--web", "127.0.0.1:65535"], "no port is left for the facet left");
+    let mixed = place
+        .folder
+        .write("mixed.toml", room([None; 4]).replacen("position_px", "output = \"offscreen\"\nposition_px", 1));
+    let (cave, scene) = (&mixed, &place.scene);
+    let out = in_place(&place.folder, &["facet", scene, "--cave", cave, "--facet", "left,front"]).output().unwrap();
+    let wrong = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(2) && wrong.contains("into a window and into memory"), "{wrong}");
 }

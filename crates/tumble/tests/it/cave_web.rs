@@ -86,6 +86,43 @@ fn say(socket: &mut WebSocket<TcpStream>, text: &str) {
     socket.send(Message::text(text)).unwrap();
 }
 
+/// Both facets of one process have a page, and both pages take part in the barrier.
+#[test]
+fn facets_of_one_process_are_served_at_successive_ports() {
+    let place = Place::new("web-group", &twins("[64, 48]"));
+    let (out, summary) = (place.path("out"), place.path("summary.json"));
+    let (at, key) = (free_address(), place.folder.write("key", KEY));
+    let web = ["--web", &at.to_string(), "--web-key", &key, "--web-timeout", "5000", "--one-process"];
+    let run = place.start("cave", &[&web[..], &["--log-dir", &out, "--summary", &summary]].concat());
+    let addresses = [at, SocketAddr::new(at.ip(), at.port() + 1)];
+    addresses.iter().for_each(|at| wait("the page", || TcpStream::connect(at).is_ok()));
+    assert_eq!(run.facets().into_iter().map(|(names, _)| names).collect::<Vec<_>>(), ["l,w"]);
+    let show = |at: SocketAddr| {
+        let mut socket = connect(at, KEY, &format!("http://{at}")).unwrap();
+        say(&mut socket, "hello webgl2");
+        let mut next = records(&mut socket);
+        for _ in 0..40 {
+            let frame = next.iter().find(|(kind, _)| *kind == FRAME).unwrap().1;
+            say(&mut socket, &format!("drawn {frame}"));
+            assert_eq!(records(&mut socket), [(SHOW, frame)]);
+            say(&mut socket, &format!("shown {frame}"));
+            next = records(&mut socket);
+        }
+    };
+    std::thread::scope(|scope| addresses.iter().for_each(|at| _ = scope.spawn(move || show(*at))));
+    signal(run.pid(), rustix::process::Signal::INT);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    let facets = json(&place.folder.path("summary.json"))["facets"].clone();
+    for facet in facets.as_array().unwrap() {
+        assert!(facet["browsers"]["shown"].as_u64() >= Some(39) && facet["browsers"]["late"] == 0, "{facet}");
+        assert_eq!((&facet["torn"], &facet["mismatched"], &facet["dropped"]), (&0.into(), &0.into(), &0.into()));
+    }
+    let (left, wide) = (place.log("out", "l"), place.log("out", "w"));
+    assert!(left.len() > 40 && numbers(&left) == numbers(&wide));
+    place.assert_clean();
+}
+
 #[test]
 fn a_wrong_key_or_page_gets_403_and_nothing_else() {
     let place = Place::new("web-key", &twins("[64, 48]"));

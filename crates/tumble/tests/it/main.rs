@@ -11,6 +11,7 @@ mod cave_faults;
 mod cave_figures;
 mod cave_formats;
 mod cave_frames;
+mod cave_group_windows;
 mod cave_groups;
 mod cave_keys;
 mod cave_outputs;

@@ -28,8 +28,8 @@ pub struct FacetControl {
     pub reporter: Reporter,
     pub parent: Option<Parent>,
     pub connect_timeout: Duration,
-    /// Whether another facet of this process has failed, so that all end.
-    pub other_failed: Arc<AtomicBool>,
+    /// Whether all facets of this process end: one has failed, or its window was closed.
+    pub end_all: Arc<AtomicBool>,
     /// Whether packets are authenticated. A server with another key file then does not answer.
     pub sealed: bool,
 }
@@ -54,7 +54,7 @@ impl FacetControl {
     }
 
     pub fn should_stop(&self) -> bool {
-        self.signals.stop_requested() || self.is_orphaned() || self.other_failed.load(Ordering::Relaxed)
+        self.signals.stop_requested() || self.is_orphaned() || self.end_all.load(Ordering::Relaxed)
     }
 }
 

@@ -12,6 +12,8 @@ mod pictures;
 mod priority;
 mod render_thread;
 mod runner;
+mod user_input;
+mod wall;
 mod window;
 
 use super::address::{RunServer, ServerAddress};
@@ -22,7 +24,7 @@ use super::lock;
 use super::run_setup::{Role, RunSetup};
 use super::signals::Signals;
 use super::simulation::CaveSimulation;
-use super::web::WebScreen;
+use super::web::{FrameList, WebScreen, port_after};
 use crate::failure::Failure;
 pub use control::PATTERN_MARK;
 use control::{FacetControl, POLL_INTERVAL, Parent};
@@ -31,15 +33,17 @@ use frame_log::{Earlier, FrameLog};
 use group::{LeaderFrame, Membership};
 use painter::Painter;
 use picture_watch::PictureWatch;
-pub use render_thread::draw_list;
+pub use render_thread::ListMaker;
 use render_thread::{RenderThread, slot_name};
 use runner::FacetRunner;
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tumble::net::sync::{Facet, FacetOptions as SessionOptions, SyncMode};
 use tumble::net::sync::{transport::FacetNumber, udp::Entropy};
 use tumble::scene::cave::{Facet as CaveFacet, Mode, Output, resolve_cave};
+use wall::WallSetup;
 use window::WindowSetup;
 
 /// Runs a facet, or several in this process, until the end of the run.
@@ -68,10 +72,10 @@ fn show(options: &FacetOptions, reporters: &[Reporter]) -> Result<(), Failure> {
         reporter: reporters[0].clone(), // there is one for each facet, and for the preview
         parent,
         connect_timeout: Duration::from_secs_f64(options.connect_timeout),
-        other_failed: Arc::default(),
+        end_all: Arc::default(),
         sealed: false,
     };
-    let (painters, mut window) = painters(options, &setup, &facets, &control)?;
+    let (painters, windows) = painters(options, &setup, &facets, &control, reporters)?;
     let server = find_server(options, &setup, &control)?;
     let sealed = setup.cave.security.is_some() && matches!(server.address, ServerAddress::Udp(_));
     let control = FacetControl { sealed, ..control };
@@ -88,16 +92,17 @@ fn show(options: &FacetOptions, reporters: &[Reporter]) -> Result<(), Failure> {
         let session = session(options, &setup, facets.get(k), &server, (compute, &membership))?;
         runners.push(runner(options, session, membership, painter, control)?);
     }
-    match (window.take(), &mut runners[..]) {
-        (Some((window_setup, probe)), [runner]) => {
-            let shown = window_setup.show(runner, options.draw.burn_in, Some(probe));
+    match (windows, &mut runners[..]) {
+        (Windows::One(window, probe), [runner]) => {
+            let shown = window.show(runner, options.draw.burn_in, Some(probe));
             finish(runner, shown)
         }
+        (Windows::Several(wall), several) => wall.show(several, finish),
         (_, [runner]) => {
-            let shown = runner.run_offscreen();
+            let shown = runner.run();
             finish(runner, shown)
         }
-        (_, several) => together(several, &control.other_failed),
+        (_, several) => together(several, &control.end_all),
     }
 }
 
@@ -121,8 +126,9 @@ fn facets(options: &FacetOptions, setup: &RunSetup) -> Result<Vec<CaveFacet>, Fa
         if facet.display.gpu != first.display.gpu {
             return Err(wrong("have another `gpu`, so each needs a process of its own"));
         }
-        if options.web.web.is_some() {
-            return Err(wrong("are served to browsers by a process each (--web)"));
+        let apart = (facet.output == Output::Offscreen) != (first.output == Output::Offscreen);
+        if apart && options.web.web.is_none() && !options.draw.offscreen && !options.draw.no_pictures {
+            return Err(wrong("draw into a window and into memory (output), so each needs a process of its own"));
         }
     }
     Ok(facets)
@@ -131,37 +137,50 @@ fn facets(options: &FacetOptions, setup: &RunSetup) -> Result<Vec<CaveFacet>, Fa
 /// The painters of the facets of this process; `None` for one that draws nothing, or in a window.
 type Painters = Vec<Option<Painter>>;
 
-/// Prepares what draws the facets, or the window of the only one.
+/// The windows of this process.
+enum Windows {
+    None,
+    One(Box<WindowSetup>, Probe),
+    Several(Box<WallSetup>),
+}
+
+/// Prepares what draws the facets, and their windows.
 fn painters(
     options: &FacetOptions,
     setup: &RunSetup,
     facets: &[CaveFacet],
     control: &FacetControl,
-) -> Result<(Painters, Option<(WindowSetup, Probe)>), Failure> {
+    reporters: &[Reporter],
+) -> Result<(Painters, Windows), Failure> {
     let draw = &options.draw;
     let (quality, overlays) = (draw.quality, draw.debug_draw.draw);
     if draw.no_pictures {
-        return Ok((facets.iter().map(|_| None).chain(facets.is_empty().then_some(None)).collect(), None));
+        return Ok((facets.iter().map(|_| None).chain(facets.is_empty().then_some(None)).collect(), Windows::None));
     }
     let first = facets.first();
     let in_memory = |facet: &CaveFacet| facet.output == Output::Offscreen;
     let in_memory = draw.offscreen || options.web.web.is_some() || !facets.is_empty() && facets.iter().all(in_memory);
     let window_required = facets.iter().any(|f| f.window_required);
     if let Some(probe) = if in_memory { None } else { reach_desktop(&control.name, window_required)? } {
+        let lists = ListMaker::new(setup, quality, overlays);
         if facets.len() > 1 {
-            let names = options.facet.join(",");
-            let why = "several facets of one process draw into memory; use --offscreen or output = \"offscreen\", or a process for each window";
-            return Err(Failure::input(format!("--facet {names}: {why}")));
+            let read = draw.frames_dir.is_some() || draw.log_dir.is_some();
+            let looks = (read, draw.burn_in);
+            let (wall, painters) = WallSetup::new(setup, facets, lists, looks, probe, control.end_all.clone())?;
+            let painters = painters.into_iter().map(|painter| Some(Painter::Window(Box::new(painter))));
+            return Ok((painters.collect(), Windows::Several(Box::new(wall))));
         }
-        return Ok((vec![None], Some((WindowSetup::new(setup, first, quality, overlays)?, probe))));
+        return Ok((vec![None], Windows::One(Box::new(WindowSetup::new(setup, first, lists)?), probe)));
     }
-    if let Some(screen) = web_screen(options, setup, first, &control.reporter)? {
-        return Ok((vec![Some(Painter::Browsers(Box::new(screen)))], None));
+    if let (Some(at), false) = (options.web.web, facets.is_empty()) {
+        let screens = web_screens(options, setup, facets, at, reporters)?;
+        let painters = screens.into_iter().map(|screen| Some(Painter::Browsers(Box::new(screen))));
+        return Ok((painters.collect(), Windows::None));
     }
     let thread = RenderThread::new(setup, facets, quality, overlays)?;
     let other = |pictures| Some(Painter::Other { pictures, adapter: thread.adapter().to_owned() });
     let others: Vec<_> = thread.others().iter().cloned().map(other).collect();
-    Ok((std::iter::once(Some(Painter::Memory(Box::new(thread)))).chain(others).collect(), None))
+    Ok((std::iter::once(Some(Painter::Memory(Box::new(thread)))).chain(others).collect(), Windows::None))
 }
 
 /// Connects a facet to the server.
@@ -207,11 +226,11 @@ fn runner(
 }
 
 /// Runs several facets, each in a thread. If one fails, all end.
-fn together(runners: &mut [FacetRunner], other_failed: &AtomicBool) -> Result<(), Failure> {
+fn together(runners: &mut [FacetRunner], end_all: &AtomicBool) -> Result<(), Failure> {
     let run = |runner: &mut FacetRunner| {
-        let shown = runner.run_offscreen();
+        let shown = runner.run();
         if shown.is_err() {
-            other_failed.store(true, Ordering::Relaxed);
+            end_all.store(true, Ordering::Relaxed);
         }
         finish(runner, shown)
     };
@@ -234,20 +253,30 @@ fn finish(runner: &mut FacetRunner, shown: Result<(), Failure>) -> Result<(), Fa
     written.and(shown)
 }
 
-/// Serves the facet to browsers if the options say so.
-fn web_screen(
+/// Serves the facets to browsers, each at a port.
+fn web_screens(
     options: &FacetOptions,
     setup: &RunSetup,
-    facet: Option<&CaveFacet>,
-    reporter: &Reporter,
-) -> Result<Option<WebScreen>, Failure> {
+    facets: &[CaveFacet],
+    first: SocketAddr,
+    reporters: &[Reporter],
+) -> Result<Vec<WebScreen>, Failure> {
     let (web, draw) = (&options.web, &options.draw);
-    let (Some(at), Some(facet)) = (web.web, facet) else { return Ok(None) };
     if draw.frames_dir.is_some() {
         let why = "browsers keep their pictures, so there is none to write; --log-dir writes frames.jsonl";
         return Err(Failure::input(format!("--web with --frames-dir: {why}")));
     }
-    WebScreen::open(setup, facet, at, web, draw.quality, draw.debug_draw.draw, reporter).map(Some)
+    let lists = Arc::new(FrameList::default());
+    let one = |(k, (facet, reporter)): (u16, (&CaveFacet, &Reporter))| {
+        WebScreen::open(setup, facet, port_after(first, k, &facet.name)?, web, lists.clone(), reporter)
+    };
+    let mut screens: Vec<WebScreen> = (0..).zip(facets.iter().zip(reporters)).map(one).collect::<Result<_, _>>()?;
+    let maker = ListMaker::new(setup, draw.quality, draw.debug_draw.draw);
+    let all = screens.iter().map(WebScreen::shared).collect();
+    if let Some(leader) = screens.first_mut() {
+        leader.lead(maker, all);
+    }
+    Ok(screens)
 }
 
 /// Returns where the world is stepped: by the command line, else by the cave file.

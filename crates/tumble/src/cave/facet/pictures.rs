@@ -15,6 +15,8 @@ pub enum Picture {
     Image(Image),
     /// Still to be copied from the device's memory.
     Reading(Reading),
+    /// Kept for a window, and in no other place.
+    OnDevice,
 }
 
 impl Picture {
@@ -76,8 +78,8 @@ impl Pictures {
         self.slot().wanted = Some(frame);
     }
 
-    /// Returns the wanted picture if it is there within `timeout`.
-    pub fn take(&self, timeout: Duration) -> Result<Option<Image>, Failure> {
+    /// Returns whether the wanted picture is there within `timeout`, and the picture if it is in memory.
+    pub fn take(&self, timeout: Duration) -> Result<Option<Option<Image>>, Failure> {
         let failed = |why: &dyn std::fmt::Display| Failure::run("drawing", why);
         let until = Instant::now() + timeout;
         let mut slot = self.slot();
@@ -91,11 +93,12 @@ impl Pictures {
                     let mut image = match picture.map_err(|e| failed(&e))? {
                         Picture::Image(image) => image,
                         Picture::Reading(reading) => reading.finish().map_err(|e| failed(&e))?,
+                        Picture::OnDevice => return Ok(Some(None)),
                     };
                     if digits {
                         burn_in(&mut image, frame);
                     }
-                    return Ok(Some(image));
+                    return Ok(Some(Some(image)));
                 }
                 Some(Delivered { frame, .. }) if frame > wanted => {
                     return Err(failed(&format!(
@@ -126,7 +129,7 @@ mod tests {
 
     fn taken(pictures: &Pictures) -> Result<Option<Vec<u8>>, String> {
         let taken = pictures.take(SHORT).map_err(|failure| failure.report().to_owned())?;
-        Ok(taken.map(|image| image.rgba))
+        Ok(taken.map(|image| image.unwrap().rgba))
     }
 
     #[test]

@@ -19,13 +19,49 @@ const CAVE_SHADOW_MAP_PX: u32 = 4096;
 /// Maximum size of the picture of an unfolded cave, pixels.
 pub const PREVIEW_PX: [u32; 2] = [1280, 960];
 
+/// The picture that a session asks for.
+#[derive(Clone, Copy)]
+pub struct Wanted {
+    pub frame: u64,
+    /// Whether it has the frame number.
+    pub burn_in: bool,
+    /// The calibration pattern to show instead of the scene.
+    pub pattern: Option<CalibrationPattern>,
+    /// Whether a window must read it back.
+    pub read: bool,
+}
+
 /// Request for the pictures of a frame.
-struct RenderRequest {
-    list: DrawList,
-    viewer: Viewer,
-    frame: u64,
-    burn_in: bool,
-    pattern: Option<CalibrationPattern>,
+pub struct RenderRequest {
+    pub list: DrawList,
+    pub viewer: Viewer,
+    pub wanted: Wanted,
+}
+
+/// Makes the draw lists of a cave.
+pub struct ListMaker {
+    drawing: Drawing,
+    pub quality: Option<Quality>,
+    overlays: DebugDraw,
+}
+
+impl ListMaker {
+    /// Prepares the lists of a scene.
+    pub fn new(setup: &RunSetup, quality: Option<Quality>, overlays: DebugDraw) -> ListMaker {
+        ListMaker { drawing: Drawing::new(&setup.scene), quality, overlays }
+    }
+
+    /// Makes the draw list of a picture of a cave.
+    pub fn list(&mut self, world: &World) -> Result<DrawList, Failure> {
+        let mut list = self.drawing.list(world, &self.overlays).map_err(|e| Failure::run("drawing", e))?;
+        if let Some(quality) = &self.quality {
+            quality.apply(&mut list.settings);
+        }
+        if list.settings.shadow_map_size == Quality::default().shadow_map_size {
+            list.settings.shadow_map_size = CAVE_SHADOW_MAP_PX;
+        }
+        Ok(list)
+    }
 }
 
 /// Facet to draw, and the place of its pictures.
@@ -35,11 +71,16 @@ struct Canvas {
     pictures: Pictures,
 }
 
+impl Wanted {
+    /// The first picture, for which pipelines are compiled and which nobody sees.
+    pub fn first() -> Wanted {
+        Wanted { frame: 0, burn_in: false, pattern: None, read: false }
+    }
+}
+
 /// Makes draw lists in the calling thread and pictures in its own.
 pub struct RenderThread {
-    drawing: Drawing,
-    quality: Option<Quality>,
-    overlays: DebugDraw,
+    lists: ListMaker,
     requests: SyncSender<RenderRequest>,
     /// Pictures of the first facet.
     pictures: Pictures,
@@ -83,11 +124,9 @@ impl RenderThread {
         let (software, adapter) =
             started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
         // as in windows: a software driver is slow
-        let quality = quality.or(software.then(Quality::fast));
+        let lists = ListMaker::new(setup, quality.or(software.then(Quality::fast)), overlays);
         let mut render_thread = RenderThread {
-            drawing: Drawing::new(&setup.scene),
-            quality,
-            overlays,
+            lists,
             requests,
             pictures: all[0].clone(), // one for each canvas, and there is at least one
             others: all[1..].to_vec(),
@@ -95,7 +134,7 @@ impl RenderThread {
             adapter,
         };
         // the first pictures take seconds to compile pipelines, and nothing waits for them yet
-        render_thread.begin(&setup.world, &setup.viewer()?, 0, false, None)?;
+        render_thread.begin(&setup.world, &setup.viewer()?, &Wanted::first())?;
         for pictures in &all {
             pictures.want(0);
             while pictures.take(Duration::from_secs(1))?.is_none() {}
@@ -118,59 +157,35 @@ impl RenderThread {
         &self.adapter
     }
 
-    /// Starts the pictures of the world, or of a calibration pattern, with the frame number in them for
-    /// `burn_in`, and asks for that of the first facet.
-    pub fn begin(
-        &mut self,
-        world: &World,
-        viewer: &Viewer,
-        frame: u64,
-        burn_in: bool,
-        pattern: Option<CalibrationPattern>,
-    ) -> Result<(), Failure> {
-        let list = draw_list(&mut self.drawing, world, self.quality.as_ref(), &self.overlays)?;
-        self.pictures.want(frame);
+    /// Starts the pictures of the world, or of a calibration pattern, and asks for that of the first facet.
+    pub fn begin(&mut self, world: &World, viewer: &Viewer, wanted: &Wanted) -> Result<(), Failure> {
+        let list = self.lists.list(world)?;
+        self.pictures.want(wanted.frame);
         self.requests
-            .send(RenderRequest { list, viewer: viewer.clone(), frame, burn_in, pattern })
+            .send(RenderRequest { list, viewer: viewer.clone(), wanted: *wanted })
             .map_err(|_| Failure::run("drawing", "the render thread has ended"))
     }
 
     /// Returns the picture of the first facet if it is finished within `timeout`.
-    pub fn finished(&mut self, timeout: Duration) -> Result<Option<Image>, Failure> {
+    pub fn finished(&mut self, timeout: Duration) -> Result<Option<Option<Image>>, Failure> {
         self.pictures.take(timeout)
     }
 }
 
-/// Makes the draw list of a picture of a cave.
-pub fn draw_list(
-    drawing: &mut Drawing,
-    world: &World,
-    quality: Option<&Quality>,
-    overlays: &DebugDraw,
-) -> Result<DrawList, Failure> {
-    let mut list = drawing.list(world, overlays).map_err(|e| Failure::run("drawing", e))?;
-    if let Some(quality) = quality {
-        quality.apply(&mut list.settings);
-    }
-    if list.settings.shadow_map_size == Quality::default().shadow_map_size {
-        list.settings.shadow_map_size = CAVE_SHADOW_MAP_PX;
-    }
-    Ok(list)
-}
-
 fn render_all(mut view: CaveView, canvases: &[Canvas], renderer: &mut Renderer, incoming: &Receiver<RenderRequest>) {
     while let Ok(request) = incoming.recv() {
-        apply_viewer(&mut view, &request.viewer, request.frame);
+        let Wanted { frame, burn_in, pattern, .. } = request.wanted;
+        apply_viewer(&mut view, &request.viewer, frame);
         let text = |error: RenderError| error.to_string();
         let stage = renderer.stage(&request.list).map_err(text);
         let draw = |canvas: &Canvas| {
             let stage = stage.as_ref().map_err(String::clone)?;
-            draw(&view, renderer, stage, canvas.facet.as_ref(), request.pattern).map_err(text)
+            draw(&view, renderer, stage, canvas.facet.as_ref(), pattern).map_err(text)
         };
         // the device draws the next picture while the last one is copied
         let drawn: Vec<_> = canvases.iter().map(draw).collect();
         for (canvas, picture) in canvases.iter().zip(drawn) {
-            canvas.pictures.put(request.frame, request.burn_in, picture.and_then(|p| p.wait().map_err(text)));
+            canvas.pictures.put(frame, burn_in, picture.and_then(|p| p.wait().map_err(text)));
         }
     }
     canvases.iter().for_each(|canvas| canvas.pictures.end());

@@ -6,7 +6,7 @@ use super::group::Membership;
 use super::painter::Painter;
 use super::picture_watch::PictureWatch;
 use super::priority;
-use super::render_thread::image_hash;
+use super::render_thread::{Wanted, image_hash};
 use crate::cave::endpoints::FacetEndpoint;
 use crate::cave::facet_report::Reporter;
 use crate::failure::Failure;
@@ -15,6 +15,8 @@ use std::time::Duration;
 use tumble::net::sync::{EndReason, Facet, SessionError, Task};
 use tumble::render::{CalibrationPattern, Image};
 
+/// Interval at which the input of a window is looked at.
+const INPUT_INTERVAL: Duration = Duration::from_millis(8);
 /// Pause while the frame log has no room for another frame.
 const LOG_FULL_PAUSE: Duration = Duration::from_millis(5);
 
@@ -90,7 +92,7 @@ impl FacetRunner {
         if self.control.is_orphaned() {
             return Err(Failure::run(&self.control.title(), "its launcher has ended"));
         }
-        if self.control.signals.stop_requested() || self.control.other_failed.load(Ordering::Relaxed) {
+        if self.control.signals.stop_requested() || self.control.end_all.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let task = self.facet.next(timeout).map_err(failed)?;
@@ -124,19 +126,29 @@ impl FacetRunner {
         self.server_wait.elapsed().as_secs()
     }
 
-    /// Draws into memory, or nothing, until the end.
-    pub fn run_offscreen(&mut self) -> Result<(), Failure> {
+    /// Draws until the end by the painter, or nothing without one.
+    pub fn run(&mut self) -> Result<(), Failure> {
+        if let Some(painter) = &mut self.painter {
+            let control = &self.control;
+            if !painter.prepare(self.facet.world(), self.facet.viewer(), || control.should_stop())? {
+                return Ok(());
+            }
+        }
         let painter = self.painter.as_ref();
         self.prepared(painter.is_some_and(Painter::is_software), painter.map_or("", Painter::adapter));
-        while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { POLL_INTERVAL })? {
+        let interval = if matches!(painter, Some(Painter::Window(_))) { INPUT_INTERVAL } else { POLL_INTERVAL };
+        while let Some(task) = self.next(if self.drawing.is_some() { Duration::ZERO } else { interval })? {
             match task {
                 // a started picture is finished first, even if no frame waits for it any more
-                Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.poll_picture()?,
+                Task::Wait(_) | Task::Draw if self.drawing.is_some() => self.poll_picture(interval)?,
                 Task::Wait(_) | Task::Ended(_) => {}
                 // the frame log is behind: the session stays alive and the server waits
                 Task::Draw if !self.has_room() => std::thread::sleep(LOG_FULL_PAUSE),
                 Task::Draw => self.draw()?,
                 Task::Present(frame) => self.present(frame)?,
+            }
+            if let Some(painter) = &mut self.painter {
+                painter.attend(&mut self.facet, self.server_wait.elapsed().as_secs())?;
             }
         }
         Ok(())
@@ -145,10 +157,11 @@ impl FacetRunner {
     fn draw(&mut self) -> Result<(), Failure> {
         let Some(frame) = self.membership.begin(&mut self.facet) else { return Ok(()) };
         let time_s = self.facet.session().time_s();
+        let read = self.wants_picture();
         match &mut self.painter {
             Some(painter) => {
-                let pattern = self.control.pattern();
-                painter.begin(self.facet.world(), self.facet.viewer(), frame, self.burn_in, pattern)?;
+                let wanted = Wanted { frame, burn_in: self.burn_in, pattern: self.control.pattern(), read };
+                painter.begin(self.facet.world(), self.facet.viewer(), &wanted)?;
                 self.drawing = Some((frame, time_s));
                 Ok(())
             }
@@ -156,11 +169,11 @@ impl FacetRunner {
         }
     }
 
-    fn poll_picture(&mut self) -> Result<(), Failure> {
+    fn poll_picture(&mut self, timeout: Duration) -> Result<(), Failure> {
         let (Some(painter), Some((frame, time_s))) = (&mut self.painter, self.drawing) else {
             return Ok(());
         };
-        match painter.finished(POLL_INTERVAL)? {
+        match painter.finished(timeout)? {
             Some(image) => self.drawn(frame, time_s, image),
             None => Ok(()),
         }
@@ -179,7 +192,7 @@ impl FacetRunner {
 
     /// Reports and logs a shown frame.
     pub fn present(&mut self, frame: u64) -> Result<(), Failure> {
-        self.painter.iter_mut().for_each(|painter| painter.present(frame));
+        self.painter.iter_mut().try_for_each(|painter| painter.present(frame))?;
         self.facet.presented().map_err(failed)?;
         let shown = self.facet.session().shown();
         let Some(drawn) = self.picture.take().filter(|d| d.frame == frame) else { return Ok(()) };

@@ -3,11 +3,12 @@
 use crate::cave::address::{ServerAddress, address_towards};
 use crate::cave::args::{CaveOptions, ComputeKind, ServeOptions, TransportKind};
 use crate::cave::run_setup::PREVIEW;
+use crate::cave::web::port_after;
 use crate::failure::Failure;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use tumble::net::sync::FacetSlot;
-use tumble::scene::cave::{Cave, Facet, Node};
+use tumble::scene::cave::{Cave, Facet, Node, Output};
 
 /// Returns the facet slots of a run: all facets, or the preview alone.
 pub fn slots(cave: &Cave, preview: bool) -> Vec<FacetSlot> {
@@ -43,39 +44,53 @@ pub fn launch(node: &Node, facet: &str, arguments: &[String]) -> Vec<String> {
     node.launch.iter().flat_map(fill).collect()
 }
 
-/// Returns the addresses at which facets of this machine serve browsers, by name.
+/// Returns the names of the facets of this machine that are served to browsers.
 ///
 /// # Errors
-/// A facet of --web-facets that is none of this machine, or a port beyond the last.
-pub fn web_addresses(launcher: &CaveOptions, cave: &Cave) -> Result<BTreeMap<String, SocketAddr>, Failure> {
-    let Some(first) = launcher.web.web else { return Ok(BTreeMap::new()) };
+/// A facet of --web-facets that is none of this machine.
+pub fn web_facets(launcher: &CaveOptions, cave: &Cave) -> Result<Vec<String>, Failure> {
+    let Some(first) = launcher.web.web else { return Ok(Vec::new()) };
     let local = |facet: &&Facet| facet.node.is_none_or(|node| cave.nodes[node].is_local());
     let all: Vec<&str> = cave.facets.iter().filter(local).map(|facet| facet.name.as_str()).collect();
-    let wrong = |what: String| Failure::input(format!("--web {first}: {what}"));
     if let Some(name) = launcher.web_facets.iter().find(|name| !all.contains(&name.as_str())) {
-        return Err(wrong(format!("no facet of this machine is named {name}; there are {}", all.join(", "))));
+        let what = format!("no facet of this machine is named {name}; there are {}", all.join(", "));
+        return Err(Failure::input(format!("--web {first}: {what}")));
     }
     let chosen = |name: &&str| launcher.web_facets.is_empty() || launcher.web_facets.iter().any(|one| one == name);
-    let one = |(k, name): (u16, &str)| {
-        // a free port for each
-        let port = if first.port() == 0 { Some(0) } else { first.port().checked_add(k) };
-        let port = port.ok_or_else(|| wrong(format!("no port is left for the facet {name}")))?;
-        Ok((name.to_owned(), SocketAddr::new(first.ip(), port)))
-    };
-    (0..).zip(all.into_iter().filter(chosen)).map(one).collect()
+    Ok(all.into_iter().filter(chosen).map(str::to_owned).collect())
+}
+
+/// Returns the addresses at which facets serve browsers, by name: one after the other, process by process,
+/// because the facets of a process are at successive ports.
+///
+/// # Errors
+/// A port beyond the last.
+pub fn web_addresses(
+    launcher: &CaveOptions,
+    cave: &Cave,
+    processes: &[Vec<usize>],
+    web: &[String],
+) -> Result<BTreeMap<String, SocketAddr>, Failure> {
+    let Some(first) = launcher.web.web else { return Ok(BTreeMap::new()) };
+    let names = processes.iter().flatten().map(|&k| &cave.facets[k].name).filter(|name| web.contains(name));
+    (0..).zip(names).map(|(k, name)| Ok((name.clone(), port_after(first, k, name)?))).collect()
 }
 
 /// Returns the facets of a run by process: those with one `process` on a node, or, with --one-process, all of
-/// a node with one adapter. Facets that browsers show have processes of their own.
-pub fn processes(cave: &Cave, launcher: Option<&CaveOptions>, web: &BTreeMap<String, SocketAddr>) -> Vec<Vec<usize>> {
+/// a node with one adapter and one kind of output. Facets that browsers show are apart from others.
+pub fn processes(cave: &Cave, launcher: Option<&CaveOptions>, web: &[String]) -> Vec<Vec<usize>> {
     if launcher.is_some_and(|launcher| launcher.preview) {
         return vec![vec![0]];
     }
     let one_process = launcher.is_some_and(|launcher| launcher.one_process);
+    let in_memory =
+        |facet: &Facet| launcher.is_some_and(|launcher| launcher.draw.offscreen) || facet.output == Output::Offscreen;
     let with = |a: &Facet, b: &Facet| {
-        let same =
-            if one_process { a.display.gpu == b.display.gpu } else { a.process.is_some() && a.process == b.process };
-        same && a.node == b.node && [a, b].iter().all(|facet| !web.contains_key(&facet.name))
+        let same = match one_process {
+            true => a.display.gpu == b.display.gpu && in_memory(a) == in_memory(b),
+            false => a.process.is_some() && a.process == b.process,
+        };
+        same && a.node == b.node && web.contains(&a.name) == web.contains(&b.name)
     };
     let mut processes: Vec<Vec<usize>> = Vec::new();
     for (k, facet) in cave.facets.iter().enumerate() {
@@ -87,8 +102,8 @@ pub fn processes(cave: &Cave, launcher: Option<&CaveOptions>, web: &BTreeMap<Str
     processes
 }
 
-/// Returns the arguments of a process with these facets; `web` is the address at which it serves browsers, and
-/// `again` says that it is started again.
+/// Returns the arguments of a process with these facets; `web` is the address at which the first one serves
+/// browsers, and `again` says that it is started again.
 pub fn facet_args(
     launcher: &CaveOptions,
     names: &[&str],
@@ -129,7 +144,7 @@ pub fn facet_args(
         ("--overwrite", draw.overwrite && !again),
         ("--continue-frames", again),
         ("--burn-in", draw.burn_in),
-        ("--offscreen", draw.offscreen || launcher.one_process),
+        ("--offscreen", draw.offscreen),
         ("--no-pictures", draw.no_pictures),
         ("--watch-pictures", launcher.serve.console.is_some() && !draw.no_pictures),
     ];

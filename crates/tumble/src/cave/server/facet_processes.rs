@@ -2,7 +2,7 @@
 //! started, monitored and ended. For all others the command line is printed.
 
 use super::facet_commands::{
-    address_for, facet_args, launch, processes, scene_args, shell_quoted, slots, web_addresses,
+    address_for, facet_args, launch, processes, scene_args, shell_quoted, slots, web_addresses, web_facets,
 };
 use crate::cave::address::ServerAddress;
 use crate::cave::args::{CaveOptions, ServeOptions};
@@ -116,8 +116,10 @@ impl FacetProcesses {
         address: &ServerAddress,
         signals: &Signals,
     ) -> Result<FacetProcesses, Failure> {
-        let web = launcher.map_or(Ok(BTreeMap::new()), |launcher| web_addresses(launcher, cave))?;
+        let web = launcher.map_or(Ok(Vec::new()), |launcher| web_facets(launcher, cave))?;
         let groups = processes(cave, launcher, &web);
+        let addresses = |launcher| web_addresses(launcher, cave, &groups, &web);
+        let web = launcher.map_or(Ok(BTreeMap::new()), addresses)?;
         let mut processes = FacetProcesses {
             processes: Vec::new(),
             restart: launcher.is_some_and(|l| l.restart),

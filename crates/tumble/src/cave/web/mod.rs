@@ -1,5 +1,5 @@
 //! A facet on the screens of web browsers (`--web`): phones, tablets, televisions. The facet's process
-//! serves one page and a WebSocket; the page draws with the shaders of the renderer.
+//! serves one page and a WebSocket for each of its facets; the page draws with the shaders of the renderer.
 //!
 //! ```text
 //! frame ─► draw list ─► PortablePicture ─► Encoder ─► WebSocket ─► page: WebGPU or WebGL 2
@@ -12,7 +12,9 @@
 
 mod crowd;
 mod encode;
+mod frame_list;
 mod link;
 mod screen;
 
-pub use screen::{KEY_VARIABLE, WebScreen, new_key};
+pub use frame_list::FrameList;
+pub use screen::{KEY_VARIABLE, WebScreen, new_key, port_after};

@@ -1,11 +1,12 @@
 //! The picture of a facet as browsers draw it: the counterpart of the render thread.
 
 use super::crowd::Crowd;
+use super::frame_list::{FrameList, ListedFrame};
 use super::link::{Shared, serve};
 use crate::cave::address::address_towards;
 use crate::cave::args::WebOptions;
 use crate::cave::console::read_token;
-use crate::cave::facet::draw_list;
+use crate::cave::facet::ListMaker;
 use crate::cave::facet_report::{BrowserReport, Reporter};
 use crate::cave::listener::Listener;
 use crate::cave::run_setup::{RunSetup, apply_viewer};
@@ -18,7 +19,7 @@ use tumble::dynamics::World;
 use tumble::net::browser::MIN_KEY_BYTES;
 use tumble::net::sync::Viewer;
 use tumble::net::sync::udp::Entropy;
-use tumble::render::{CaveView, DebugDraw, Drawing, GlslTranslator, Quality};
+use tumble::render::{CaveView, GlslTranslator, Quality};
 use tumble::scene::cave::{Facet, Stereo};
 
 /// Environment variable with the key of a run, by which a launcher keeps links when it starts a facet
@@ -31,9 +32,12 @@ const ELSEWHERE: &str = "192.0.2.1";
 
 /// The picture of a facet on browsers.
 pub struct WebScreen {
-    drawing: Drawing,
-    quality: Quality,
-    overlays: DebugDraw,
+    /// The lists of the process's frames.
+    lists: Arc<FrameList>,
+    /// Of the first facet alone, which has the world: what makes the lists, for the browsers of which facets.
+    leads: Option<(ListMaker, Vec<Arc<Shared>>)>,
+    /// The frame whose list the first facet has not made yet.
+    wanted: Option<u64>,
     view: CaveView,
     facet: Facet,
     glsl: GlslTranslator,
@@ -53,8 +57,7 @@ impl WebScreen {
         facet: &Facet,
         at: SocketAddr,
         options: &WebOptions,
-        quality: Option<Quality>,
-        overlays: DebugDraw,
+        lists: Arc<FrameList>,
         reporter: &Reporter,
     ) -> Result<WebScreen, Failure> {
         check(setup, facet)?;
@@ -77,10 +80,9 @@ impl WebScreen {
         reporter.line(&format!("serves browsers at {}", listener.address()));
         reporter.update(|report| report.browsers = Some(BrowserReport::default()));
         Ok(WebScreen {
-            drawing: Drawing::new(&setup.scene),
-            // unknown devices: hard shadows, smooth edges
-            quality: quality.unwrap_or(Quality { samples: 4, ..Quality::fast() }),
-            overlays,
+            lists,
+            leads: None,
+            wanted: None,
             view: setup.view()?,
             facet: facet.clone(),
             glsl: GlslTranslator::new().map_err(|e| Failure::run(&title, e))?,
@@ -90,14 +92,35 @@ impl WebScreen {
         })
     }
 
-    /// Sends a frame to the browsers that have drawn their last.
+    /// Returns what it shares with its connections.
+    pub fn shared(&self) -> Arc<Shared> {
+        self.shared.clone()
+    }
+
+    /// Makes this the first facet of its process, which makes the draw lists for the browsers of all.
+    pub fn lead(&mut self, mut maker: ListMaker, all: Vec<Arc<Shared>>) {
+        // unknown devices: hard shadows, smooth edges
+        maker.quality.get_or_insert(Quality { samples: 4, ..Quality::fast() });
+        self.leads = Some((maker, all));
+    }
+
+    /// Sends a frame to the browsers that have drawn their last, as soon as its draw list is there.
     pub fn begin(&mut self, world: &World, viewer: &Viewer, frame: u64) -> Result<(), Failure> {
-        if !self.shared.crowd().is_idle() {
+        let Some((maker, all)) = &mut self.leads else {
+            self.wanted = Some(frame);
             return Ok(());
-        }
-        apply_viewer(&mut self.view, viewer, frame);
-        let list = draw_list(&mut self.drawing, world, Some(&self.quality), &self.overlays)?;
-        let picture = self.view.portable(&list, &self.facet).map_err(|e| Failure::run("drawing", e))?;
+        };
+        let ready = all.iter().any(|shared| shared.crowd().is_idle());
+        let list = ready.then(|| maker.list(world)).transpose()?;
+        let listed = self.lists.put(ListedFrame { frame, viewer: viewer.clone(), list });
+        self.send(&listed)
+    }
+
+    fn send(&mut self, listed: &ListedFrame) -> Result<(), Failure> {
+        let frame = listed.frame;
+        let Some(list) = listed.list.as_ref().filter(|_| self.shared.crowd().is_idle()) else { return Ok(()) };
+        apply_viewer(&mut self.view, &listed.viewer, frame);
+        let picture = self.view.portable(list, &self.facet).map_err(|e| Failure::run("drawing", e))?;
         let glsl = &self.glsl;
         let refused = self.shared.crowd().begin(frame, Instant::now(), |encoder| encoder.frame(frame, &picture, glsl));
         if let Some(why) = refused {
@@ -107,17 +130,25 @@ impl WebScreen {
     }
 
     /// Waits at most `timeout` until no browser is awaited for the frame. Returns whether that is so.
-    pub fn is_finished(&mut self, timeout: Duration) -> bool {
+    pub fn is_finished(&mut self, timeout: Duration) -> Result<bool, Failure> {
         let until = Instant::now() + timeout;
+        if let Some(wanted) = self.wanted {
+            let Some(listed) = self.lists.wait(wanted, until) else { return Ok(false) };
+            self.wanted = None;
+            // the first facet may have gone on, with the next frame
+            if listed.frame == wanted {
+                self.send(&listed)?;
+            }
+        }
         let mut crowd = self.shared.crowd();
         loop {
             let now = Instant::now();
             if crowd.is_drawn(now) {
-                return true;
+                return Ok(true);
             }
             let left = until.saturating_duration_since(now);
             if left.is_zero() {
-                return false;
+                return Ok(false);
             }
             // browsers that say nothing are late by the clock
             let wait = left.min(Duration::from_millis(10));
@@ -136,6 +167,18 @@ impl WebScreen {
             self.reported = counts;
         }
     }
+}
+
+/// Returns the address of the facet with this index: each is at the port after the one before, or at any that
+/// is free.
+///
+/// # Errors
+/// A port beyond the last.
+pub fn port_after(first: SocketAddr, index: u16, facet: &str) -> Result<SocketAddr, Failure> {
+    // a free port for each
+    let port = if first.port() == 0 { Some(0) } else { first.port().checked_add(index) };
+    let port = port.ok_or_else(|| Failure::input(format!("--web {first}: no port is left for the facet {facet}")))?;
+    Ok(SocketAddr::new(first.ip(), port))
 }
 
 /// Checks that a browser can show a facet.
