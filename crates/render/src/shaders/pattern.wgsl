@@ -21,6 +21,38 @@ fn line_cover(x: f32, width: f32, w: f32) -> f32 {
     return (floor(b) * width + min(fract(b), width) - floor(a) * width - min(fract(a), width)) / h;
 }
 
+// One of 2^24 numbers for a sum of products of the coordinates of a corner.
+fn corner(n: u32) -> f32 {
+    let h = (n ^ (n >> 15u)) * 739982445u;
+    return f32((h ^ (h >> 13u)) >> 8u);
+}
+
+// Smooth noise of patterns, 0 to 1. With cheap light it is that of a plane, along a direction that no face of a
+// box has, with one short hash for each of four corners instead of three for each of eight: another grain, of
+// the same size and about the same contrast.
+fn grain(p: vec3f) -> f32 {
+    if (REFLECTIONS) { return noise3(p); }
+    let q = p.xy + vec2f(0.37, 0.91) * p.z;
+    let base = floor(q);
+    let i = vec2u(vec2i(clamp(base, vec2f(-1e9), vec2f(1e9)))) * vec2u(2376512323u, 3625334849u);
+    let j = i + vec2u(2376512323u, 3625334849u);
+    let f = q - base;
+    let u = f * f * (3.0 - 2.0 * f);
+    let a = mix(corner(i.x + i.y), corner(j.x + i.y), u.x);
+    let b = mix(corner(i.x + j.y), corner(j.x + j.y), u.x);
+    return 0.1 + 0.8 * mix(a, b, u.y) / 16777216.0;
+}
+
+// Smooth noise along a line through the middles of the cells of row `row`. Four corners have the half of the
+// deviation of one.
+fn drift(x: f32, row: i32) -> f32 {
+    if (REFLECTIONS) { return noise3(vec3f(x, f32(row) + 0.5, 0.5)); }
+    let base = floor(x);
+    let i = u32(i32(clamp(base, -1e9, 1e9))) * 2376512323u + u32(row) * 3625334849u;
+    let f = x - base;
+    return 0.25 + 0.5 * mix(corner(i), corner(i + 2376512323u), f * f * (3.0 - 2.0 * f)) / 16777216.0;
+}
+
 fn checker(p: vec3f, w: vec3f) -> f32 {
     return 0.5 + 0.5 * square_wave(p.x, w.x) * square_wave(p.y, w.y) * square_wave(p.z, w.z);
 }
@@ -91,16 +123,16 @@ fn wood(color: vec3f, dark: vec3f, p: vec3f, ring: f32, board: f32, w: f32) -> v
         joint = line_cover(p.y / board, 0.035, w / board);
     }
     // the pith lies below the cut and varies slowly, so that rings open into long arches
-    let wander = vec2f(noise3(vec3f(q.x / (ring * 60.0), 3.5, 0.5)), noise3(vec3f(q.x / (ring * 45.0), 7.5, 0.5))) - 0.5;
+    let wander = vec2f(drift(q.x / (ring * 60.0), 3), drift(q.x / (ring * 45.0), 7)) - 0.5;
     let radial = vec2f(q.y * 0.8, q.z + ring * 3.0) + wander * ring * 7.0;
-    let rough = noise3(vec3f(q.x / (ring * 25.0), q.y / (ring * 2.0), q.z / (ring * 2.0))) - 0.5;
+    let rough = grain(vec3f(q.x / (ring * 25.0), q.y / (ring * 2.0), q.z / (ring * 2.0))) - 0.5;
     let phase = length(radial) / ring + rough * 0.9;
     let saw = fract(phase);
     let visible = 1.0 - smoothstep(0.25, 1.2, w / ring);
     let late = mix(0.35, smoothstep(0.15, 0.85, saw) * (1.0 - smoothstep(0.88, 1.0, saw)), visible);
     let fiber_at = vec3f(q.x / (ring * 9.0), q.y / (ring * 0.12), q.z / (ring * 0.12));
     let fiber_visible = 1.0 - smoothstep(0.05, 0.5, w / ring);
-    let fiber = (noise3(fiber_at) - 0.5) * fiber_visible;
+    let fiber = (grain(fiber_at) - 0.5) * fiber_visible;
     let c = mix(color, dark, clamp(bold * late + 0.28 * fiber + 0.18 * rough * visible, 0.0, 1.0)) * (1.0 + 0.34 * tint);
     return mix(c, dark * 0.35, 0.75 * clamp(joint, 0.0, 1.0));
 }
@@ -156,8 +188,8 @@ fn base_of(p: vec3f, n: vec3f, place: vec3f, w: f32, color_rough: vec4f, other: 
         case 5u: {
             let q = p / size.x;
             let visible = 1.0 - smoothstep(0.3, 1.5, w / size.x);
-            let weave = (noise3(q * vec3f(1.0, 0.25, 1.0)) + noise3(q * vec3f(0.25, 1.0, 1.0) + 17.0) - 1.0) * visible;
-            let worn = noise3(p * 9.0) + 0.5 * noise3(p * 31.0) - 0.75;
+            let weave = (grain(q * vec3f(1.0, 0.25, 1.0)) + grain(q * vec3f(0.25, 1.0, 1.0) + 17.0) - 1.0) * visible;
+            let worn = grain(p * 9.0) + 0.5 * grain(p * 31.0) - 0.75;
             base.color = color_rough.xyz * (1.0 + 0.55 * weave + 0.10 * worn);
             base.sheen = 0.35;
         }
@@ -169,9 +201,9 @@ fn base_of(p: vec3f, n: vec3f, place: vec3f, w: f32, color_rough: vec4f, other: 
         }
         case 7u: {
             let q = p / size.x;
-            let bent = q + 1.6 * vec3f(noise3(q + 7.3), noise3(q + 19.1), noise3(q + 31.7));
-            let fine = (noise3(bent * 4.0) - 0.5) * (1.0 - smoothstep(0.1, 0.5, w / size.x));
-            let ridge = abs(noise3(bent) - 0.5) * 2.0 + 0.25 * fine;
+            let bent = q + 1.6 * vec3f(grain(q + 7.3), grain(q + 19.1), grain(q + 31.7));
+            let fine = (grain(bent * 4.0) - 0.5) * (1.0 - smoothstep(0.1, 0.5, w / size.x));
+            let ridge = abs(grain(bent) - 0.5) * 2.0 + 0.25 * fine;
             base.color = mix(other, color_rough.xyz, smoothstep(0.0, 0.45, ridge));
         }
         default: {}

@@ -137,9 +137,8 @@ fn groups_that_cannot_be_are_refused() {
     refused(&["--facet", "front,ceiling", "--no-pictures"], "ceiling");
     refused(&["--facet", "front,left,front", "--no-pictures"], "front is named twice");
     refused(&["--facet", "front,left", "--web", "127.0.0.1:65535"], "no port is left for the facet left");
-    let mixed = place
-        .folder
-        .write("mixed.toml", room([None; 4]).replacen("position_px", "output = \"offscreen\"\nposition_px", 1));
+    let mixed = room([None; 4]).replacen("position_px = [0, 20]", "output = \"offscreen\"", 1);
+    let mixed = place.folder.write("mixed.toml", mixed);
     let (cave, scene) = (&mixed, &place.scene);
     let out = in_place(&place.folder, &["facet", scene, "--cave", cave, "--facet", "left,front"]).output().unwrap();
     let wrong = String::from_utf8_lossy(&out.stderr);
