@@ -2,7 +2,7 @@
 
 use crate::support::{bare, from_above, linear, picture, white_sun};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tumble_render::{Camera, DrawList, Image, Light, Material, MeshData, Sky};
+use tumble_render::{Camera, DrawList, Image, Light, Material, MeshData, Pattern, Quality, Sky};
 
 /// A matte floor of sRGB white and nothing else on it.
 fn floor(list: &mut DrawList, half: f32) {
@@ -259,4 +259,39 @@ fn a_turned_ball_shows_its_other_side() {
         (0..3).all(|k| (f32::from(side[k]) - blue[k]).abs() < 2.0),
         "blue stripe at the side: {side:?}, expected {blue:?}"
     );
+}
+
+/// With cheap light, patterns have another noise: the mean and the contrast of each stay.
+#[test]
+fn patterns_of_cheap_light_keep_color_and_contrast() {
+    let patterns = [
+        Pattern::Wood { dark: [0.2, 0.1, 0.05], ring_m: 0.3, board_m: 0.0 },
+        Pattern::Wood { dark: [0.2, 0.1, 0.05], ring_m: 0.3, board_m: 0.7 },
+        Pattern::Felt { thread_m: 0.1 },
+        Pattern::Marble { vein: [0.1, 0.1, 0.2], size_m: 0.5 },
+    ];
+    for pattern in patterns {
+        let looks = |reflections: bool| {
+            let mut list = bare(from_above(10.0));
+            let quad = list.add_mesh(MeshData::ground_quad(20.0));
+            // inclined, so that all coordinates of the pattern count
+            let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.4);
+            let place = Isometry3::from_parts(Vector3::zeros().into(), tilt);
+            list.add_instance(quad, place, Material { pattern, ..Material::unlit([0.7, 0.5, 0.3]) });
+            Quality { reflections, ..Quality::fastest() }.apply(&mut list.settings);
+            let image = picture(&list, 400, 400)?;
+            let pixels: Vec<f64> = (0..160_000).map(|k| linear(&image, k % 400, k / 400, 0)).collect();
+            let mean = pixels.iter().sum::<f64>() / 160_000.0;
+            let variance = pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 160_000.0;
+            Some((image.rgba, mean, variance.sqrt()))
+        };
+        let (Some((full, mean, contrast)), Some((cheap, cheap_mean, cheap_contrast))) = (looks(true), looks(false))
+        else {
+            return;
+        };
+        println!("{pattern:?}: {mean:.4} ± {contrast:.4}, cheap {cheap_mean:.4} ± {cheap_contrast:.4}");
+        assert!(full != cheap, "{pattern:?}: the same noise");
+        assert!((cheap_mean / mean - 1.0).abs() < 0.05, "{pattern:?}: {cheap_mean} instead of {mean}");
+        assert!((cheap_contrast / contrast - 1.0).abs() < 0.25, "{pattern:?}: {cheap_contrast} instead of {contrast}");
+    }
 }
