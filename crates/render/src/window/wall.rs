@@ -13,7 +13,7 @@ use winit::window::WindowId;
 pub trait WallApp {
     /// The error that ends it early.
     type Error: From<RenderError>;
-    /// What other threads ask of it.
+    /// Request of another thread.
     type Message: Send + 'static;
 
     /// Called when all windows are open.

@@ -60,11 +60,14 @@ fn last_picture(place: &Place, facet: &str) -> Image {
     Image::read_png(place.folder.path("out").join(facet).join(format!("frame_{frame:06}.png"))).unwrap()
 }
 
+/// Name, processes of the four facets, and options of a run.
+type Form = (&'static str, [Option<&'static str>; 4], &'static [&'static str]);
+
 #[test]
 fn windows_of_one_process_draw_the_bytes_of_single_ones() {
     let Some(desktop) = desktop() else { return };
     let some = [Some("walls"), None, Some("walls"), Some("walls")];
-    let forms: [(&str, [Option<&str>; 4], &[&str]); 3] =
+    let forms: [Form; 3] =
         [("window-single", [None; 4], &[]), ("window-some", some, &[]), ("window-all", [None; 4], &["--one-process"])];
     let places = forms.map(|(test, processes, more)| {
         let cave = room(processes).replace("position_px", "output = \"window\"\nposition_px");

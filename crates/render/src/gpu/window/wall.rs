@@ -24,9 +24,9 @@ pub struct Wall {
 /// A window with its pictures.
 struct Kept {
     pane: Pane,
-    /// What it shows.
+    /// The picture that it shows.
     shown: Option<wgpu::Texture>,
-    /// What it shows next, by frame.
+    /// The pictures that it shows next, by frame.
     drawn: VecDeque<(u64, wgpu::Texture)>,
     spare: Vec<wgpu::Texture>,
 }

@@ -43,7 +43,7 @@ const OPEN_INTERVAL: Duration = Duration::from_millis(20);
 /// Calibration patterns of a window that wait for their frames, at most.
 const MAX_PATTERNS: usize = 2;
 
-/// What the sessions ask of the windows.
+/// Request of a session to the windows.
 pub enum WallMessage {
     /// Draw a frame for all windows.
     Draw(Box<RenderRequest>),
@@ -78,7 +78,7 @@ pub struct WindowPainter {
     mailbox: Mailbox<WallMessage>,
     device: Arc<OnceLock<Device>>,
     link: Arc<Link>,
-    /// Of the first facet alone, which has the world.
+    /// Draw lists: of the first facet alone, which has the world.
     lists: Option<ListMaker>,
     sender: InputSender,
     /// Number of seconds without a server in the last warning.
@@ -97,7 +97,7 @@ impl WindowPainter {
             }
         };
         let default = if device.software { Quality::fast() } else { Quality::default() };
-        self.lists.iter_mut().for_each(|lists| _ = lists.quality.get_or_insert(default.clone()));
+        self.lists.iter_mut().for_each(|lists| _ = lists.quality.get_or_insert(default));
         self.begin(world, viewer, &Wanted::first())?;
         while self.finished(OPEN_INTERVAL)?.is_none() {
             if stop() {

@@ -34,7 +34,7 @@ const ELSEWHERE: &str = "192.0.2.1";
 pub struct WebScreen {
     /// The lists of the process's frames.
     lists: Arc<FrameList>,
-    /// Of the first facet alone, which has the world: what makes the lists, for the browsers of which facets.
+    /// Maker of the lists and connections of all facets: of the first facet alone, which has the world.
     leads: Option<(ListMaker, Vec<Arc<Shared>>)>,
     /// The frame whose list the first facet has not made yet.
     wanted: Option<u64>,
