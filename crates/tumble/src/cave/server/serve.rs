@@ -25,6 +25,8 @@ use tumble::scene::cave::Cave;
 
 /// Interval at which signals and processes are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Time to read what a facet has sent before the end of its process.
+const LAST_WORDS: Duration = Duration::from_millis(2);
 
 /// Maximum time for facets to compile their pipelines and draw one picture.
 const PREPARATION_TIMEOUT: Duration = Duration::from_secs(300);
@@ -247,6 +249,10 @@ impl<'a> RunLoop<'a> {
     /// Polls the facets' processes. Returns `false` if all have ended on request of their users.
     fn check_processes(&mut self, processes: &mut FacetProcesses) -> Result<bool, Failure> {
         let look = processes.watch(false)?;
+        if !look.ended.is_empty() {
+            // a facet that has left on request has said so before its end
+            self.server.idle_until(self.server.now() + LAST_WORDS).map_err(failed)?;
+        }
         look.ended.into_iter().try_for_each(|facet| self.server.facet_exited(facet)).map_err(failed)?;
         match look.processes {
             ProcessStatus::Running => Ok(true),
