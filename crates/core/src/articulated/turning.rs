@@ -9,7 +9,7 @@ use tumble_collide::{Mat3, Vec3};
 /// `4 + 2√3`: see the head of `step/turning.rs`.
 const AGAINST_EACH_OTHER: f64 = 7.464_101_615_137_754;
 
-/// What a link carries: the sums over itself and the links beyond it.
+/// The load of a joint: sums over its link and the links beyond it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Carried {
     /// N.
