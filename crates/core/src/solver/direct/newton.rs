@@ -42,8 +42,6 @@ const REGULAR: [f64; 4] = [1e-13, 1e-6, 100.0, 0.1];
 const MEMORY: usize = 6;
 /// Number of lengths of a step that are tried, each half of the last.
 const LENGTHS: u32 = 6;
-/// A step is too long at all lengths if the shortest raises `|f|` to this multiple of what is accepted: those between are not tried.
-const TOO_LONG: f64 = 4.0;
 
 /// A small island with the matrix of its rows.
 pub(in crate::solver) struct SmallIsland<'a> {
@@ -161,10 +159,7 @@ impl<'a> SmallIsland<'a> {
             let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
             let size = |t: f64| self.size(|block| at.point_along(&change, t, block), None);
             let falls = |t: &f64| size(*t) < (1.0 - 1e-4 * t) * largest;
-            let mut lengths = (0..LENGTHS).map(|k| 0.5_f64.powi(k as i32));
-            let too_long = || size(0.5_f64.powi(LENGTHS as i32 - 1)) > TOO_LONG * largest;
-            let whole = lengths.next().filter(falls);
-            let length = match whole.or_else(|| if too_long() { None } else { lengths.find(falls) }) {
+            let length = match (0..LENGTHS).map(|k| 0.5_f64.powi(k as i32)).find(falls) {
                 Some(length) => {
                     if length == 1.0 {
                         epsilon = (0.1 * epsilon).max(REGULAR[0]);
