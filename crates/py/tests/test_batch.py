@@ -140,6 +140,38 @@ def test_drives_in_bulk_are_those_of_the_joints(arm_world):
     assert (batch.state == alone(arm_world, [np.zeros(6)], 1).state).all()
 
 
+def test_drives_of_spherical_joints_and_of_robots_with_a_floating_root():
+    builder = tumble.ArticulationBuilder("arm")
+    builder.add_link("body", joint="floating", shape=tumble.Sphere(0.1), mass=5)
+    builder.add_link("upper", "body", joint="spherical", shape=tumble.Sphere(0.1), shape_position=(0, 0, -1), mass=2)
+    builder.add_link("lower", "upper", axis=(0, 1, 0), position=(0, 0, -1), shape=tumble.Sphere(0.1), mass=1)
+    world = tumble.World(gravity=(0, 0, 0))
+    world.add_articulation(builder.build(), name="arm")
+
+    def driven(ball, hinge):
+        fork = world.fork()
+        fork["arm"].set_drive("upper", target=ball, stiffness=50, damping=5)
+        fork["arm"].set_drive("lower", target=hinge, stiffness=50, damping=5)
+        return fork
+
+    batch = tumble.Batch(world, 2)
+    batch.set_drives(target=[0.0] * 6 + [0.3, -0.2, 0.4, 0.1], stiffness=50, damping=5)
+    batch.step(substeps=40)
+    fork = driven((0.3, -0.2, 0.4), 0.1)
+    fork.step(40)
+    assert (batch.state == fork.state).all() and abs(fork["arm"].q[-5:]).max() > 0.05
+    # targets are no state: those of the last step stay after a reset
+    batch.reset()
+    batch.step(targets=[0.0] * 6 + [0.1, 0.2, -0.3, 0.5])
+    batch.reset()
+    batch.step(substeps=10)
+    fork = driven((0.1, 0.2, -0.3), 0.5)
+    fork.step(10)
+    assert (batch.state == fork.state).all()
+    with pytest.raises(tumble.InvalidValueError, match="world 0: .*'body'.*only revolute, prismatic and spherical joints have them"):
+        batch.set_drives(stiffness=[50.0] * 10)
+
+
 def test_contact_forces_carry_the_weight():
     world = tumble.World()
     world.add_static("floor", tumble.HalfSpace())

@@ -12,6 +12,7 @@
 //! LᵀL`.
 
 use super::collider::{Collider, LinkCollider};
+use super::turning::Carried;
 use crate::articulated::algorithms::dynamics::{Dynamics, Scratch};
 use crate::articulated::algorithms::free_motion::FreeMotion;
 use crate::articulated::model::LinkMass;
@@ -144,6 +145,7 @@ pub(super) struct BodyCache {
     pub free_rate: Vec<f64>,
     pub wrenches: Vec<Wrench>,
     pub accelerations: Vec<(Vec3, Vec3)>,
+    pub carried: Vec<Carried>,
 }
 
 impl BodyCache {
@@ -156,6 +158,7 @@ impl BodyCache {
             free_rate: Vec::with_capacity(model.dof()),
             wrenches: vec![Default::default(); model.links().len()],
             accelerations: vec![(Vec3::zeros(), Vec3::zeros()); model.links().len()],
+            carried: Vec::with_capacity(model.links().len()),
             dynamics,
         }
     }

@@ -11,6 +11,7 @@ use crate::contact::warm_starts::RowStart;
 use crate::object::part_state::StateRange;
 use crate::object::{Constraint, Level, RowTarget};
 use crate::world::view::WorldView;
+use smallvec::{SmallVec, smallvec};
 use tumble_collide::Vec3;
 
 impl ArticulatedBody {
@@ -167,7 +168,7 @@ impl Constraint for ArticulatedBody {
     fn rows(&self, me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
         let x = &view.x[me.x.clone()];
         let dof = self.model.dof();
-        let mut maker = RowMaker { unit: vec![0.0; dof], known: vec![None; dof], out };
+        let mut maker = RowMaker { unit: smallvec![0.0; dof], known: smallvec![None; dof], out };
         self.each_limit(x, |Limit { gap, along }| {
             let target = RowTarget::new(RowSet::HalfLine, gap);
             match along {
@@ -254,9 +255,9 @@ fn ball_positions(q: &[f64], dofs: &[DofSettings], time: f64) -> [[f64; 3]; 2] {
 
 /// Makes rows on the generalized coordinates of the owner.
 struct RowMaker<'a, 'b> {
-    unit: Vec<f64>,
+    unit: SmallVec<[f64; 32]>,
     /// The first row along each degree of freedom, with its sign.
-    known: Vec<Option<(usize, f64)>>,
+    known: SmallVec<[Option<(usize, f64)>; 32]>,
     out: &'a mut RowBuilder<'b>,
 }
 

@@ -48,9 +48,10 @@ impl Object for ArticulatedBody {
                 (dynamics.link_pose(i), angular_velocity, velocity);
             (part_state.bias_angular_acceleration, part_state.bias_acceleration) = accelerations[i];
         }
-        rest[0] = PartState { pose: *self.base(), ..PartState::default() };
+        let base = PartState { pose: *self.base(), ..PartState::default() };
+        rest[0] = base;
         for (part_state, LinkCollider { link, collider, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
-            let carrier = link.map_or(PartState { pose: *self.base(), ..PartState::default() }, |l| moving[l]);
+            let carrier = link.map_or(&base, |l| &moving[l]);
             part_state.pose = carrier.pose * collider.pose;
             let (point, spin) = (part_state.position(), carrier.angular_velocity);
             let arm = point - carrier.position();
@@ -171,13 +172,13 @@ impl Integratable for ArticulatedBody {
             (part_state.angular_acceleration, part_state.acceleration) = (*angular, *linear);
         }
         for (part_state, LinkCollider { link, .. }) in rest[1..].iter_mut().zip(&self.colliders) {
-            let carrier = link.map_or(PartState::default(), |l| moving[l]);
-            let point = part_state.position();
-            part_state.angular_acceleration = carrier.angular_acceleration;
-            part_state.acceleration = if link.is_some() {
-                carrier.acceleration_following(&point, &carrier.velocity_at(&point))
-            } else {
-                Vec3::zeros()
+            (part_state.angular_acceleration, part_state.acceleration) = match link.map(|l| &moving[l]) {
+                Some(carrier) => {
+                    let point = part_state.position();
+                    let velocity = carrier.velocity_at(&point);
+                    (carrier.angular_acceleration, carrier.acceleration_following(&point, &velocity))
+                }
+                None => (Vec3::zeros(), Vec3::zeros()),
             };
         }
     }
@@ -189,7 +190,7 @@ impl Integratable for ArticulatedBody {
         gravity: &Vec3,
         loads: &mut dyn Iterator<Item = PointLoad>,
     ) -> (usize, f64) {
-        self.fastest_turn(&cache.get::<BodyCache>().dynamics, part_states, gravity, loads)
+        self.fastest_turn(cache.get(), part_states, gravity, loads)
     }
 
     fn free_motion_rate(&self, cache: &mut Cache, _x: &[f64], out: &mut [f64]) {

@@ -286,7 +286,38 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
 }
 
+/// Writes the products of the rows of a row-major matrix with a vector, with the bits of [`dot`].
+pub(crate) fn multiply(matrix: &[f64], vector: &[f64], out: &mut [f64]) {
+    pulp::Arch::new().dispatch(Multiplication { matrix, vector, out });
+}
+
+/// A call of [`multiply`] that is compiled for the widest registers of the processor.
+struct Multiplication<'a> {
+    matrix: &'a [f64],
+    vector: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Multiplication<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Multiplication { matrix, vector, out } = self;
+        let rows = matrix.chunks_exact(vector.len().max(1)).zip(out);
+        match vector.len() {
+            0..8 => rows.for_each(|(row, out)| *out = dot(row, vector)),
+            _ => rows.for_each(|(row, out)| *out = sum_long(row, vector)),
+        }
+    }
+}
+
 fn long_dot(a: &[f64], b: &[f64]) -> f64 {
+    sum_long(a, b)
+}
+
+#[inline(always)]
+fn sum_long(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (a, b) in a.iter().zip(b) {

@@ -152,8 +152,9 @@ impl Detector<'_> {
         self.broad.pairs(&mut pairs);
         self.order_by_part(&mut pairs);
         let mut found = std::mem::take(&mut self.scratch.found);
-        let pieces = self.threads.pieces(pairs.len(), PAIRS);
-        found.resize_with(pieces.len().max(found.len()), Found::default);
+        let alone = self.threads.count() == 1 || pairs.len() < 2 * PAIRS;
+        let pieces = if alone { Vec::new() } else { self.threads.pieces(pairs.len(), PAIRS) };
+        found.resize_with(pieces.len().max(found.len()).max(1), Found::default);
         let narrow = NarrowPhase {
             objects: self.objects,
             owners: self.owners,
@@ -168,12 +169,17 @@ impl Detector<'_> {
         // the first piece writes to the results at once
         std::mem::swap(out, &mut found[0].contact_constraints);
         let last = &self.scratch.narrow_phase_cache;
-        let work: Vec<(&[[u32; 2]], &mut Found)> =
-            pieces.into_iter().map(|piece| &pairs[piece]).zip(&mut found).collect();
-        self.threads.each(work, |(pairs, found)| {
+        let look = |(pairs, found): (&[[u32; 2]], &mut Found)| {
             let mut known = last.from(pairs.first().map_or([0; 2], |pair| narrow.rows(*pair)));
             pairs.iter().for_each(|&pair| narrow.add_pair(pair, &mut known, found));
-        });
+        };
+        if alone {
+            look((&pairs[..], &mut found[0]));
+        } else {
+            let work: Vec<(&[[u32; 2]], &mut Found)> =
+                pieces.into_iter().map(|piece| &pairs[piece]).zip(&mut found).collect();
+            self.threads.each(work, look);
+        }
         std::mem::swap(out, &mut found[0].contact_constraints);
         self.scratch.narrow_phase_cache.replace(found.iter_mut().map(|found| &mut found.cached));
         for found in &mut found {

@@ -20,6 +20,7 @@
 
 use super::objects::{IslandObject, dof_of, objects_of, place_of};
 use crate::constraint::rows::{Block, RowSet, Rows, dot};
+use smallvec::{SmallVec, smallvec};
 
 /// A row is folded if `|y_e|²/R_e` is at most this: `B` then costs no more than four of sixteen digits.
 const STIFF: f64 = 1e4;
@@ -34,25 +35,25 @@ pub(super) struct Folded {
     pub c: Vec<f64>,
     pub lambda: Vec<f64>,
     /// Blocks of the island that are left, in their order, and those that are folded.
-    members: Vec<u32>,
-    soft: Vec<u32>,
+    members: SmallVec<[u32; 32]>,
+    soft: SmallVec<[u32; 32]>,
     objects: Vec<IslandObject>,
     /// First number of the `G` of each object, if it has soft rows.
-    factor: Vec<Option<usize>>,
+    factor: SmallVec<[Option<usize>; 4]>,
     /// `G` of all objects with soft rows, row-major, with the reciprocals of its diagonal on its diagonal.
-    factors: Vec<f64>,
+    factors: SmallVec<[f64; 64]>,
     /// `b` of all objects.
-    free: Vec<f64>,
+    free: SmallVec<[f64; 32]>,
 }
 
 impl Folded {
     /// Returns `None` if no row can be folded.
     pub fn new(rows: &Rows, blocks: &[u32], (c, lambda): (&[f64], &[f64])) -> Option<Folded> {
-        if !blocks.iter().any(|&b| is_soft(rows, &rows.blocks[b as usize])) {
+        let (soft, members): (SmallVec<[u32; 32]>, SmallVec<[u32; 32]>) =
+            blocks.iter().copied().partition(|&b| is_soft(rows, &rows.blocks[b as usize]));
+        if soft.is_empty() {
             return None;
         }
-        let (soft, members): (Vec<u32>, Vec<u32>) =
-            blocks.iter().partition(|&&b| is_soft(rows, &rows.blocks[b as usize]));
         let objects = objects_of(rows, blocks);
         let mut folded = Folded {
             rows: Rows::default(),
@@ -61,10 +62,10 @@ impl Folded {
             lambda: Vec::new(),
             members,
             soft,
-            factor: vec![None; objects.len()],
+            factor: smallvec![None; objects.len()],
             objects,
-            factors: Vec::new(),
-            free: Vec::new(),
+            factors: SmallVec::new(),
+            free: SmallVec::new(),
         };
         folded.factor(rows, c);
         folded.respond(rows, (c, lambda));

@@ -40,6 +40,7 @@ use super::reduced::Reduced;
 use super::relaxation::Relaxation;
 use super::{RowSolver, SolveReport, SolverSettings, residual};
 use crate::constraint::rows::{RowSet, Rows, dot};
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
 /// Number of sweeps with extrapolation.
@@ -110,7 +111,7 @@ fn solve_folded(
     (lambda, du): (&mut [f64], &mut [f64]),
     settings: SolverSettings,
 ) -> SolveReport {
-    let mut own = vec![0.0; folded.dof()];
+    let mut own = SmallVec::<[f64; 32]>::from_elem(0.0, folded.dof());
     let Folded { rows: rest, blocks, c: free, lambda: start, .. } = &mut folded;
     let outcome = if blocks.is_empty() {
         SolveReport { iterations: 1, converged: true, ray: false, relaxations: 0 }

@@ -1,6 +1,7 @@
 //! The objects of an island, numbered from 0, with their velocities in a row.
 
 use crate::constraint::rows::Rows;
+use smallvec::SmallVec;
 
 /// An object of an island.
 #[derive(Clone, Copy, Debug)]
@@ -16,7 +17,13 @@ pub(super) struct IslandObject {
 /// Returns the objects that blocks act on, ascending by their place in `u`.
 pub(super) fn objects_of(rows: &Rows, blocks: &[u32]) -> Vec<IslandObject> {
     let sides = blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides());
-    let mut all: Vec<(u32, u32)> = sides.map(|side| (side.u, side.dof)).collect();
+    let mut all: SmallVec<[(u32, u32); 32]> = SmallVec::new();
+    // rows of a robot come one after the other
+    for side in sides.map(|side| (side.u, side.dof)) {
+        if all.last() != Some(&side) {
+            all.push(side);
+        }
+    }
     all.sort_unstable();
     all.dedup();
     let mut first = 0;

@@ -6,7 +6,8 @@
 //! slide     w_n = 0, w_t along the unit direction d           λ_t = −μ·λ_n·d,  λ_n = −b_n / r,  r = k_nn − μ·k_nt·d
 //! ```
 //!
-//! Sticking is tried first: if two solutions exist, this keeps piles from alternating between them.
+//! Sticking is tried first: if two solutions exist, this keeps piles from alternating between them. A robot that moves
+//! in a plane has no response across it. `K` is then inverted in the plane, and the contact sticks if it is still across.
 //! Sliding takes one projected step, normal first, which suffices if normal and tangents hardly
 //! couple. If `μ·|k_nt|` comes near `k_nn` (a leaning rod on rough ground) that step diverges and
 //! sliding is solved exactly. The direction is then the root of `g(φ) = d × w_t` with `d·w_t > 0`,
@@ -17,6 +18,8 @@ use crate::constraint::rows::{Block, Rows, dot, dot6};
 
 /// Fraction of `k_nn` at which `μ·|k_nt|` makes the projected step too large.
 const COUPLED: f64 = 0.5;
+/// A tangent has no response below this fraction of the other, and no velocity below this fraction of the free one.
+const PLANE: f64 = 1e-12;
 /// Maximum number of Newton steps for the sliding direction.
 const SLIDE_STEPS: u32 = 12;
 
@@ -27,10 +30,20 @@ pub(super) struct ContactBlock {
     pub k: Symmetric3,
     /// `K⁻¹`, absent if a direction has no response.
     inverse: Option<Symmetric3>,
+    /// The same of a contact that responds in a plane.
+    in_plane: Option<InPlane>,
     /// `1/λ_max(K_tt)`; 0 if no tangent has a response.
     rho: f64,
     /// Whether `μ·|k_nt|` is close to `k_nn`.
     coupled: bool,
+}
+
+/// A contact of bodies that move in a plane.
+struct InPlane {
+    /// Inverse of `K` in the plane, 0 across it.
+    inverse: Symmetric3,
+    /// The tangent along the plane.
+    along: [f64; 2],
 }
 
 /// A symmetric 3×3 matrix; 0 is the normal, 1 and 2 are the tangents.
@@ -52,7 +65,9 @@ impl ContactBlock {
         let largest = mean + (half * half + k.m21 * k.m21).sqrt();
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
         let coupled = mu * mu * (k.m10 * k.m10 + k.m20 * k.m20) > COUPLED * COUPLED * k.m00 * k.m00;
-        ContactBlock { mu, k, inverse: if mu > 0.0 { k.inverse() } else { None }, rho, coupled }
+        let inverse = if mu > 0.0 { k.inverse() } else { None };
+        let in_plane = if inverse.is_none() && rho > 0.0 { InPlane::new(&k, largest) } else { None };
+        ContactBlock { mu, k, inverse, in_plane, rho, coupled }
     }
 
     /// Returns whether a contact without multipliers stays open at normal velocity `w_n`, whatever
@@ -73,7 +88,11 @@ impl ContactBlock {
                 return (full, delta);
             }
         }
-        let next = self.open_or_slide(old, w);
+        let stuck = self.in_plane.as_ref().and_then(|plane| plane.stick(&self.k, old, w));
+        let within = |full: &[f64; 3]| {
+            full[0] >= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0])
+        };
+        let next = stuck.filter(within).unwrap_or_else(|| self.open_or_slide(old, w));
         (next, [next[0] - old[0], next[1] - old[1], next[2] - old[2]])
     }
 
@@ -149,6 +168,45 @@ impl ContactBlock {
         let (square, bound) = (t1 * t1 + t2 * t2, self.mu * n);
         let scale = if square > bound * bound { bound / square.sqrt() } else { 1.0 };
         [n, scale * t1, scale * t2]
+    }
+}
+
+impl InPlane {
+    /// Returns `None` if both tangents respond, or one in the plane has no response of its own. `largest` is `λ_max(K_tt)`.
+    fn new(k: &Symmetric3, largest: f64) -> Option<InPlane> {
+        if k.m11 + k.m22 - largest > PLANE * largest {
+            return None;
+        }
+        // the longer of the two columns of a matrix of rank 1
+        let along = unit(if k.m11 >= k.m22 { [k.m11, k.m21] } else { [k.m21, k.m22] })?;
+        let coupling = k.m10 * along[0] + k.m20 * along[1];
+        let determinant = k.m00 * largest - coupling * coupling;
+        if determinant <= PLANE * k.m00.max(largest).powi(2) {
+            return None;
+        }
+        let (normal, mixed, own) = (largest / determinant, -coupling / determinant, k.m00 / determinant);
+        let inverse = Symmetric3 {
+            m00: normal,
+            m10: mixed * along[0],
+            m20: mixed * along[1],
+            m11: own * along[0] * along[0],
+            m21: own * along[0] * along[1],
+            m22: own * along[1] * along[1],
+        };
+        Some(InPlane { inverse, along })
+    }
+
+    /// Returns the sticking solution, `None` if the contact moves across the plane, where nothing stops it.
+    fn stick(&self, k: &Symmetric3, old: [f64; 3], w: [f64; 3]) -> Option<[f64; 3]> {
+        let (own, [a, b]) = (k.times(old), self.along);
+        let across = (a * w[2] - b * w[1]).abs();
+        let free = (w[0] - own[0]).abs() + (a * (w[1] - own[1]) + b * (w[2] - own[2])).abs();
+        if across > PLANE * free {
+            return None;
+        }
+        // a force across the plane moves nothing
+        let (delta, kept) = (self.inverse.times(w), a * old[1] + b * old[2]);
+        Some([old[0] - delta[0], kept * a - delta[1], kept * b - delta[2]])
     }
 }
 

@@ -327,8 +327,10 @@ impl Backtracking {
         }
         let mut velocity = Vec::new();
         row_velocities(&core.threads, &work.rows, &work.bias, &u, &mut velocity);
-        let acceleration: Vec<f64> =
-            gyroscopic(core.coordinates(None)).iter().zip(&work.du_force).map(|(g, rate)| rate - g).collect();
+        let mut acceleration = work.du_force.clone();
+        if let Some(turning) = gyroscopic(core.coordinates(None)) {
+            acceleration.iter_mut().zip(&turning).for_each(|(rate, g)| *rate -= g);
+        }
         row_velocities(&core.threads, &work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
         let mut keep = vec![true; work.rows.blocks.len()];
         for (i, (constraint, role)) in work.contact_constraints.iter().zip(&self.watch.roles).enumerate() {

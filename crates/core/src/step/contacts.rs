@@ -127,7 +127,7 @@ fn look_ahead(core: &mut Core, ahead: f64) -> Moment {
         let x = &mut x[entry.state_range.x.clone()];
         match entry.object.integratable().filter(|b| b.holds_velocity() && entry.moves()) {
             Some(body) => {
-                let mut v = vec![0.0; entry.state_range.v.len()];
+                let mut v = SmallVec::<[f64; 32]>::from_elem(0.0, entry.state_range.v.len());
                 body.velocity(x, &mut v);
                 body.integrate_positions(x, &v, ahead);
             }
@@ -297,7 +297,7 @@ pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Res
     for of_one in work.limits.chunk_by_mut(|a, b| a.key[0] == b.key[0]) {
         let place = of_one[0].key[0] as usize;
         let one_sided = (first[place]..first[place + 1]).filter(|&i| work.targets[i].set == RowSet::HalfLine);
-        let rows: Vec<usize> = one_sided.collect();
+        let rows: SmallVec<[usize; 64]> = one_sided.collect();
         if rows.len() == of_one.len() {
             for (limit, &row) in of_one.iter_mut().zip(&rows) {
                 limit.target = Some(row as u32);
@@ -311,7 +311,7 @@ pub(super) fn locate_limits(core: &Core, work: &mut Workspace, time: f64) -> Res
 /// Subtracts from the errors of the constraints their change by free motion of `ahead` seconds, to
 /// second order.
 fn present_errors(Coordinates { objects, x, caches, .. }: Coordinates, work: &mut Workspace, ahead: f64) {
-    let mut u = vec![0.0; objects.table.dof()];
+    let mut u = SmallVec::<[f64; 64]>::from_elem(0.0, objects.table.dof());
     for entry in objects.iter().filter(|e| e.moves()) {
         if let Some(body) = entry.object.integratable() {
             body.whitened_velocity(
@@ -356,7 +356,8 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches, .. }: Coordin
     let mut out = vec![0.0; objects.table.dof()];
     for entry in objects.iter().filter(|e| e.moves()) {
         let Some(body) = entry.object.integratable().filter(|b| b.holds_velocity()) else { continue };
-        let (v, mut rate) = (entry.state_range.v.clone(), vec![0.0; entry.state_range.v.len()]);
+        let v = entry.state_range.v.clone();
+        let mut rate = SmallVec::<[f64; 32]>::from_elem(0.0, v.len());
         let cache = &mut caches[entry.place];
         body.free_motion_rate(cache, &x[entry.state_range.x.clone()], &mut rate);
         rate.iter_mut().for_each(|r| *r *= h);
@@ -366,16 +367,17 @@ pub(crate) fn free_motion_change(Coordinates { objects, x, caches, .. }: Coordin
 }
 
 /// Returns the part of the whitened rate of momentum that is no acceleration, `L⁻ᵀ(ṗ − M·v̇)`. Rows
-/// of constraints exclude it.
-pub(crate) fn gyroscopic(Coordinates { objects, x, caches, .. }: Coordinates) -> Vec<f64> {
-    let mut out = vec![0.0; objects.table.dof()];
-    let mut turning = SmallVec::<[f64; 6]>::new();
+/// of constraints exclude it. `None` if it is 0.
+pub(crate) fn gyroscopic(Coordinates { objects, x, caches, .. }: Coordinates) -> Option<Vec<f64>> {
+    let (mut out, dof) = (None, objects.table.dof());
+    let mut turning = SmallVec::<[f64; 32]>::new();
     for entry in objects.iter().filter(|e| e.moves()) {
         let (Some(body), v) = (entry.object.integratable(), entry.state_range.v.clone()) else { continue };
         turning.clear();
         turning.resize(v.len(), 0.0);
         body.gyroscopic(&x[entry.state_range.x.clone()], &mut turning);
         if turning.iter().any(|t| *t != 0.0) {
+            let out = out.get_or_insert_with(|| vec![0.0; dof]);
             body.whiten_change(&mut caches[entry.place], &turning, &mut out[v]);
         }
     }

@@ -387,6 +387,27 @@ impl World {
         Ok(())
     }
 
+    /// Returns the generalized forces that are applied to an object during the next frame, one per degree of freedom, N·m and N;
+    /// `None` if it was removed.
+    pub fn applied_generalized(&self, id: ObjectId) -> Option<&[f64]> {
+        self.core.state.applied_generalized.get(self.core.table.get(id)?.state_range.v.clone())
+    }
+
+    /// Replaces the generalized forces that are applied to an object during the next frame, one per degree of freedom, N·m and N.
+    ///
+    /// # Errors
+    /// As [`apply_generalized`](Self::apply_generalized); the forces then stay.
+    pub fn set_applied_generalized(&mut self, id: ObjectId, forces: &[f64]) -> Result<(), WorldError> {
+        let before = self.applied_generalized(id).ok_or(WorldError::Stale)?.to_vec();
+        let range = self.core.table.get(id).ok_or(WorldError::Stale)?.state_range.v.clone();
+        self.core.state.applied_generalized[range.clone()].fill(0.0);
+        let outcome = self.apply_generalized(id, forces);
+        if outcome.is_err() {
+            self.core.state.applied_generalized[range].copy_from_slice(&before);
+        }
+        outcome
+    }
+
     /// Removes the forces that were applied for the next frame.
     pub fn clear_applied(&mut self) {
         self.core.state.clear_applied();

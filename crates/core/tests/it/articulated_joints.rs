@@ -77,6 +77,14 @@ fn a_torque_gives_its_acceleration() {
     let mut world = arm("time_stepping", DofSettings::default());
     let id = world.ids()[0];
     assert!(world.apply_generalized(id, &[1.0, 2.0]).is_err() && world.apply_generalized(id, &[f64::NAN]).is_err());
+    world.apply_generalized(id, &[0.5]).unwrap();
+    world.apply_generalized(id, &[0.25]).unwrap();
+    assert!(world.set_applied_generalized(id, &[f64::INFINITY]).is_err());
+    assert_eq!(world.applied_generalized(id), Some(&[0.75][..]));
+    world.set_applied_generalized(id, &[0.1]).unwrap();
+    assert_eq!(world.applied_generalized(id), Some(&[0.1][..]));
+    world.step().unwrap();
+    assert_eq!(world.applied_generalized(id), Some(&[0.0][..]));
 }
 
 #[test]

@@ -2482,8 +2482,9 @@ class Batch:
         """Sets the drives of all degrees of freedom of the articulations in all worlds; those of which all
         numbers are 0 or None have none then.
 
-        Arguments as in ``Articulation.set_drive``: one number for all, shape (dof,) or (n, dof). Drives
-        are no part of the state, so ``reset`` leaves them.
+        Arguments as in ``Articulation.set_drive``: one number for all joints, shape (dof,) or (n, dof). A
+        spherical joint has three columns, and a floating root six, which must be 0. Drives and their
+        targets are no part of the state, so ``reset`` leaves them.
         """
     def set_body(
         self,

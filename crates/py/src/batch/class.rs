@@ -295,8 +295,9 @@ impl Batch {
     /// Sets the drives of all degrees of freedom of the articulations in all worlds; those of which all
     /// numbers are 0 or None have none then.
     ///
-    /// Arguments as in ``Articulation.set_drive``: one number for all, shape (dof,) or (n, dof). Drives
-    /// are no part of the state, so ``reset`` leaves them.
+    /// Arguments as in ``Articulation.set_drive``: one number for all joints, shape (dof,) or (n, dof). A
+    /// spherical joint has three columns, and a floating root six, which must be 0. Drives and their
+    /// targets are no part of the state, so ``reset`` leaves them.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None))]
     fn set_drives(
         &self,

@@ -1,29 +1,40 @@
 //! Drives of all worlds of a batch at once.
 
-use crate::arrays::convert::{Numbers, numbers};
+use crate::arrays::convert::numbers;
 use crate::batch::fields::{Layout, Rows};
 use crate::batch::member::change;
 use crate::errors::{Error, Result};
 use crate::objects::joints::drive;
 use crate::world::inner::Inner;
 use pyo3::prelude::*;
+use tumble::dynamics::{ArticulatedBody, Joint};
 
 /// A setting of the drives of each degree of freedom in each world.
-pub struct Setting(Option<Rows>);
+pub enum Setting {
+    None,
+    /// That of all joints.
+    All(f64),
+    Each(Rows),
+}
 
 impl Setting {
-    /// Converts one number for all, a row for all worlds or a row for each. None stays None.
+    /// Converts one number for all joints, a row for all worlds or a row for each. None stays None.
     pub fn new(name: &str, given: Option<&Bound<'_, PyAny>>, worlds: usize, dof: usize) -> Result<Setting> {
-        let Some(given) = given else { return Ok(Setting(None)) };
-        let mut given = numbers(given, name)?;
-        if given.shape.is_empty() {
-            given = Numbers { shape: vec![dof], data: vec![given.data[0]; dof] };
+        let Some(given) = given else { return Ok(Setting::None) };
+        let given = numbers(given, name)?;
+        match given.shape.is_empty() {
+            true => Ok(Setting::All(given.data[0])),
+            false => Ok(Setting::Each(Rows::new(name, given, worlds, dof)?)),
         }
-        Ok(Setting(Some(Rows::new(name, given, worlds, dof)?)))
     }
 
-    fn of(&self, world: usize, dof: usize) -> Option<f64> {
-        self.0.as_ref().map(|rows| rows.of(world)[dof])
+    /// Returns the number of a degree of freedom; what is for all joints is not for a floating root.
+    fn of(&self, world: usize, dof: usize, floating: bool) -> Option<f64> {
+        match self {
+            Setting::None => None,
+            Setting::All(number) => Some(*number).filter(|_| !floating),
+            Setting::Each(rows) => Some(rows.of(world)[dof]),
+        }
     }
 }
 
@@ -39,9 +50,9 @@ pub struct Drives {
 impl Drives {
     /// Sets the drives of one world. A degree of freedom whose numbers are all 0 or None has none.
     pub fn set(&self, layout: &Layout, inner: &mut Inner, world: usize) -> Result<()> {
-        let mut dof = 0;
+        let (mut dof, floating) = (0, floating(layout, inner));
         change(layout, inner, |settings| {
-            let of = |setting: &Setting| setting.of(world, dof);
+            let of = |setting: &Setting| setting.of(world, dof, floating[dof]);
             let (stiffness, damping) = (of(&self.stiffness).unwrap_or(0.0), of(&self.damping).unwrap_or(0.0));
             let driven = stiffness != 0.0 || damping != 0.0;
             let target = of(&self.target).filter(|_| driven);
@@ -56,4 +67,18 @@ impl Drives {
             source => Error::value(format!("world {world}: {source}")),
         })
     }
+}
+
+/// Returns whether each degree of freedom of the driven bodies is one of a floating root.
+fn floating(layout: &Layout, inner: &Inner) -> Vec<bool> {
+    let mut all = Vec::with_capacity(layout.dof());
+    for driven in &layout.driven {
+        let body = inner.world.get::<ArticulatedBody>(driven.id);
+        let links = body.map_or(&[][..], |body| body.model().links());
+        for link in links {
+            all.resize(all.len() + link.joint.dof(), link.joint == Joint::Floating);
+        }
+    }
+    all.resize(layout.dof(), false);
+    all
 }

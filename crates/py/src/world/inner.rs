@@ -29,8 +29,10 @@ pub struct Inner {
     pub notes: Vec<String>,
     /// Notes about overlapping bodies, as found before the first step.
     pub overlaps: Vec<String>,
-    /// The state before the frame. Its memory is reused.
+    /// The state before a frame with callbacks. Its memory is reused.
     before: WorldState,
+    /// Generalized forces that were applied before those of `efforts`. Its memory is reused.
+    applied: Vec<f64>,
     /// Whether a panic left it in an inconsistent state.
     pub broken: bool,
 }
@@ -48,6 +50,7 @@ impl Inner {
             notes: Vec::new(),
             overlaps: Vec::new(),
             before: WorldState::default(),
+            applied: Vec::new(),
             broken: false,
         }
     }
@@ -66,6 +69,7 @@ impl Inner {
             notes: self.notes.clone(),
             overlaps: self.overlaps.clone(),
             before: WorldState::default(),
+            applied: Vec::new(),
             broken: false,
         }
     }
@@ -89,13 +93,36 @@ impl Inner {
     /// Steps by one frame. On an error the world is as it was before, and has none of the frame's forces.
     pub fn step(&mut self) -> Result<()> {
         self.take_raised()?; // by a `fork`
-        if self.efforts.is_empty() && self.extension.is_empty() {
-            return self.frame();
+        if self.extension.is_empty() {
+            return self.plain_frame();
         }
         self.world.checkpoint(&mut self.before);
-        let outcome = if self.extension.is_empty() { self.frame() } else { self.extended_frame() };
+        let outcome = self.extended_frame();
         if outcome.is_err() {
             self.world.roll_back(&self.before);
+        }
+        outcome
+    }
+
+    /// Steps by one frame without callbacks. The world itself goes back on an error, except for the forces applied for the
+    /// frame.
+    fn plain_frame(&mut self) -> Result<()> {
+        self.applied.clear();
+        for (&id, effort) in &self.efforts {
+            let end = self.applied.len() + effort.len();
+            self.applied.extend_from_slice(self.world.applied_generalized(id).unwrap_or_default());
+            self.applied.resize(end, 0.0);
+        }
+        let outcome = self.frame();
+        if outcome.is_err() {
+            let mut rest = &self.applied[..];
+            for (&id, effort) in &self.efforts {
+                let (own, after) = rest.split_at(effort.len());
+                if self.world.applied_generalized(id).is_some() {
+                    self.world.set_applied_generalized(id, own)?;
+                }
+                rest = after;
+            }
         }
         outcome
     }

@@ -102,8 +102,12 @@ impl Dynamics {
     /// Writes `y = L⁻ᵀ j`: the whitened response to generalized impulses. Joints without an impulse on
     /// them or beyond them cost nothing.
     pub fn solve_lt(&self, s: &mut Scratch, j: &[f64], y: &mut [f64]) {
-        s.forces.fill(Force::default());
         y.fill(0.0);
+        let mut impulses = j.iter().enumerate().filter(|(_, j)| **j != 0.0);
+        if let (Some((first, _)), None) = (impulses.next(), impulses.next()) {
+            return self.solve_lt_of_one(first, j, y);
+        }
+        s.forces.fill(Force::default());
         for (i, body) in self.compiled.bodies.iter().enumerate().rev() {
             let own = &j[body.v..body.v + body.kind.dof()];
             if own.iter().all(|j| *j == 0.0) && s.forces[i + 1] == Force::default() {
@@ -111,6 +115,20 @@ impl Dynamics {
             }
             let passed = self.solve_lt_link(i + 1, body, s.forces[i + 1], |k| j[k], |k, x| y[k] = x);
             s.forces[body.parent] += passed;
+        }
+    }
+
+    /// The same for an impulse on one degree of freedom alone, with the same bits: only the links from there to the root are visited.
+    fn solve_lt_of_one(&self, dof: usize, j: &[f64], y: &mut [f64]) {
+        let mut link = self.compiled.bodies.partition_point(|body| body.v <= dof);
+        let mut force = Force::default();
+        while link != 0 {
+            let body = &self.compiled.bodies[link - 1];
+            let passed = self.solve_lt_link(link, body, force, |k| j[k], |k, x| y[k] = x);
+            (force, link) = (Force::default() + passed, body.parent);
+            if force == Force::default() {
+                return;
+            }
         }
     }
 

@@ -21,6 +21,12 @@ impl pulp::NullaryFnOnce for Elimination<'_> {
     fn call(self) -> bool {
         let Elimination { a, b } = self;
         let n = b.len();
+        match n {
+            0..8 => return solve_small::<8>(a, b),
+            8..16 => return solve_small::<16>(a, b),
+            16..24 => return solve_small::<24>(a, b),
+            _ => {}
+        }
         for first in (0..n).step_by(PANEL) {
             let end = (first + PANEL).min(n);
             for j in first..end {
@@ -52,6 +58,45 @@ impl pulp::NullaryFnOnce for Elimination<'_> {
         }
         true
     }
+}
+
+/// The same for fewer than `W` equations, with the right-hand side as one more column of a matrix whose rows fill whole
+/// registers: the same operations on each number, in the same order.
+#[inline(always)]
+fn solve_small<const W: usize>(a: &[f64], b: &mut [f64]) -> bool {
+    let n = b.len();
+    let mut m = [[0.0; W]; W];
+    for (i, row) in m[..n].iter_mut().enumerate() {
+        row[..n].copy_from_slice(&a[i * n..(i + 1) * n]);
+        row[n] = b[i];
+    }
+    for j in 0..n {
+        let (mut pivot, mut size) = (j, m[j][j].abs());
+        for (i, row) in m[..n].iter().enumerate().skip(j + 1) {
+            if row[j].abs() > size {
+                (pivot, size) = (i, row[j].abs());
+            }
+        }
+        let largest = m[pivot][j];
+        if !(largest.abs() > f64::MIN_POSITIVE && largest.is_finite()) {
+            return false;
+        }
+        m.swap(pivot, j);
+        let (own, inverse) = (m[j], 1.0 / largest);
+        // numbers left of the column are no longer read
+        let first = (j + 1) / 8 * 8;
+        for row in &mut m[j + 1..n] {
+            let factor = row[j] * inverse;
+            for start in (first..W).step_by(8) {
+                (start..start + 8).for_each(|k| row[k] -= factor * own[k]);
+            }
+        }
+    }
+    for j in (0..n).rev() {
+        let known: f64 = m[j][j + 1..n].iter().zip(&b[j + 1..]).map(|(a, x)| a * x).sum();
+        b[j] = (m[j][n] - known) / m[j][j];
+    }
+    true
 }
 
 /// Brings the largest number of column `j` to the diagonal, writes the factors of the rows below in its place, and

@@ -23,7 +23,7 @@ use super::choice::{Choice, Derivative, Point};
 use super::dense;
 use super::island::{Island, LocalBlock, largest};
 use super::{Direct, Tolerance, work_of_blocks};
-use crate::constraint::rows::{Rows, dot};
+use crate::constraint::rows::{Rows, multiply};
 
 /// Maximum number of rows of an island, and of one with a wide object, of which a sweep costs nearly as much as a step
 /// of the elimination.
@@ -57,10 +57,14 @@ struct Memory {
     coupled: Vec<usize>,
     matrix: Vec<f64>,
     right: Vec<f64>,
+    /// The same rows as stretches: the first of each and their number.
+    stretches: Vec<[usize; 2]>,
+    /// `(K + R)·δλ` of the rows that are not coupled.
+    pulled: Vec<f64>,
 }
 
 /// Multipliers and row velocities of the island.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 struct Iterate {
     lambda: Vec<f64>,
     w: Vec<f64>,
@@ -92,6 +96,8 @@ impl Iterate {
 /// The best multipliers so far.
 struct Best {
     lambda: Vec<f64>,
+    /// Those that are compared with them.
+    other: Iterate,
     error: f64,
     /// Number of equations solved.
     taken: u32,
@@ -125,7 +131,7 @@ impl<'a> SmallIsland<'a> {
         let own = self.island.read(lambda);
         let start = self.at(own.clone());
         let error = self.error(&start);
-        let mut best = Best { lambda: own, error, taken: 0, tolerance };
+        let mut best = Best { lambda: own, other: Iterate::default(), error, taken: 0, tolerance };
         self.follow(start, &mut best);
         if thorough && !best.is_solved() && best.error.is_finite() {
             self.hold(&mut best);
@@ -138,20 +144,21 @@ impl<'a> SmallIsland<'a> {
 
     /// Takes steps with the choices that each iterate asks for.
     fn follow(&mut self, mut at: Iterate, best: &mut Best) {
+        let (mut choices, mut change) = (Vec::new(), Iterate::default());
+        self.choose(&at, &mut choices);
         let mut epsilon = REGULAR[0];
-        let mut choices = self.choices(&at);
         let mut sizes = vec![self.size(|block| at.point(block), None)];
         for _ in 0..STEPS.0 {
             if best.error <= best.tolerance.goal || !sizes.iter().all(|size| size.is_finite()) {
                 return;
             }
-            let Some(change) = self.change(&at, &choices, epsilon) else { return };
+            if !self.change(&at, &choices, epsilon, &mut change) {
+                return;
+            }
             best.taken += 1;
             let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
-            let falls = |t: &f64| {
-                let size = self.size(|block| at.point_along(&change, *t, block), None);
-                size < (1.0 - 1e-4 * t) * largest
-            };
+            let size = |t: f64| self.size(|block| at.point_along(&change, t, block), None);
+            let falls = |t: &f64| size(*t) < (1.0 - 1e-4 * t) * largest;
             let length = match (0..LENGTHS).map(|k| 0.5_f64.powi(k as i32)).find(falls) {
                 Some(length) => {
                     if length == 1.0 {
@@ -169,7 +176,7 @@ impl<'a> SmallIsland<'a> {
                 }
             };
             at.advance(&change, length);
-            choices = self.choices(&at);
+            self.choose(&at, &mut choices);
             self.consider(&at, &choices, best);
             sizes.push(self.size(|block| at.point(block), None));
         }
@@ -178,8 +185,8 @@ impl<'a> SmallIsland<'a> {
     /// Tries the choices of the best multipliers, and those with one block changed.
     fn hold(&mut self, best: &mut Best) {
         let start = self.at(best.lambda.clone());
-        let mut choices = self.choices(&start);
-        let mut changes = Vec::new();
+        let (mut choices, mut changes) = (Vec::new(), Vec::new());
+        self.choose(&start, &mut choices);
         for (i, block) in self.island.blocks.iter().enumerate() {
             start.point(block).others(block, |distance, choice| changes.push((distance, i, choice)));
         }
@@ -197,7 +204,7 @@ impl<'a> SmallIsland<'a> {
 
     /// Takes steps with the choices held.
     fn follow_held(&mut self, mut at: Iterate, choices: &[Choice], best: &mut Best) {
-        let mut last = f64::INFINITY;
+        let (mut last, mut change) = (f64::INFINITY, Iterate::default());
         let mut rises = 0;
         for _ in 0..STEPS.1 {
             let size = self.size(|block| at.point(block), Some(choices));
@@ -206,7 +213,9 @@ impl<'a> SmallIsland<'a> {
                 return;
             }
             last = size;
-            let Some(change) = self.change(&at, choices, REGULAR[0]) else { return };
+            if !self.change(&at, choices, REGULAR[0], &mut change) {
+                return;
+            }
             best.taken += 1;
             at.advance(&change, 1.0);
             self.consider(&at, choices, best);
@@ -218,26 +227,36 @@ impl<'a> SmallIsland<'a> {
 
     /// Takes the multipliers that the choices ask for if they are the best.
     fn consider(&self, at: &Iterate, choices: &[Choice], best: &mut Best) {
-        let mut lambda = vec![0.0; self.island.c.len()];
+        let other = &mut best.other;
+        other.lambda.clear();
+        other.lambda.resize(self.island.c.len(), 0.0);
         for (block, choice) in self.island.blocks.iter().zip(choices) {
-            lambda[block.range()].copy_from_slice(&at.point(block).target(block, *choice)[..block.rows]);
+            other.lambda[block.range()].copy_from_slice(&at.point(block).target(block, *choice)[..block.rows]);
         }
-        let reached = self.at(lambda);
-        let error = self.error(&reached);
+        self.move_rows(other);
+        let error = self.error(other);
         if error < best.error {
-            (best.error, best.lambda) = (error, reached.lambda);
+            best.error = error;
+            std::mem::swap(&mut best.lambda, &mut other.lambda);
         }
     }
 
     fn at(&self, lambda: Vec<f64>) -> Iterate {
-        let mut w = self.times(&lambda);
-        w.iter_mut().zip(&self.island.c).for_each(|(w, c)| *w += c);
-        Iterate { lambda, w }
+        let mut at = Iterate { lambda, w: Vec::new() };
+        self.move_rows(&mut at);
+        at
     }
 
-    /// Returns `(K + R)·λ`.
-    fn times(&self, lambda: &[f64]) -> Vec<f64> {
-        self.k.chunks_exact(lambda.len().max(1)).map(|row| dot(row, lambda)).collect()
+    /// Writes the row velocities of the multipliers.
+    fn move_rows(&self, at: &mut Iterate) {
+        self.multiply(at);
+        at.w.iter_mut().zip(&self.island.c).for_each(|(w, c)| *w += c);
+    }
+
+    /// Writes `(K + R)·λ`.
+    fn multiply(&self, Iterate { lambda, w }: &mut Iterate) {
+        w.resize(lambda.len(), 0.0);
+        multiply(&self.k, lambda, w);
     }
 
     fn error(&self, at: &Iterate) -> f64 {
@@ -248,8 +267,10 @@ impl<'a> SmallIsland<'a> {
         largest(self.island.blocks.iter().map(error))
     }
 
-    fn choices(&self, at: &Iterate) -> Vec<Choice> {
-        self.island.blocks.iter().map(|block| at.point(block).choice(block)).collect()
+    /// Writes the choices that an iterate asks for.
+    fn choose(&self, at: &Iterate, choices: &mut Vec<Choice>) {
+        choices.clear();
+        choices.extend(self.island.blocks.iter().map(|block| at.point(block).choice(block)));
     }
 
     /// Returns `|f|` with the choices that the points ask for, or with those that are held.
@@ -264,15 +285,22 @@ impl<'a> SmallIsland<'a> {
         self.island.blocks.iter().enumerate().map(square).sum::<f64>().sqrt()
     }
 
-    /// Returns the change that makes the linearized function 0, `None` if there is none.
-    fn change(&mut self, at: &Iterate, choices: &[Choice], epsilon: f64) -> Option<Iterate> {
-        let Memory { coupled, matrix, right } = &mut self.memory;
+    /// Writes the change that makes the linearized function 0. Returns whether there is one.
+    fn change(&mut self, at: &Iterate, choices: &[Choice], epsilon: f64, change: &mut Iterate) -> bool {
+        let Memory { coupled, stretches, matrix, right, pulled } = &mut self.memory;
         let (island, k, count) = (&self.island, &self.k, self.island.c.len());
-        let mut lambda = vec![0.0; count];
+        let lambda = &mut change.lambda;
+        lambda.clear();
+        lambda.resize(count, 0.0);
         coupled.clear();
+        stretches.clear();
         for (block, choice) in island.blocks.iter().zip(choices) {
             if choice.is_coupled() {
                 coupled.extend(block.range());
+                match stretches.last_mut() {
+                    Some([first, len]) if *first + *len == block.row => *len += block.rows,
+                    _ => stretches.push([block.row, block.rows]),
+                }
             } else {
                 let f = at.point(block).function(block, *choice);
                 let scale = -1.0 / ((1.0 + epsilon) * block.diagonal.max(f64::MIN_POSITIVE));
@@ -283,20 +311,28 @@ impl<'a> SmallIsland<'a> {
         matrix.clear();
         matrix.resize(n * n, 0.0);
         right.clear();
-        let known = lambda.iter().any(|x| *x != 0.0);
-        let pulled = |row: usize| if known { dot(&k[row * count..][..count], &lambda) } else { 0.0 };
+        pulled.clear();
+        pulled.resize(count, 0.0);
+        if lambda.iter().any(|x| *x != 0.0) {
+            multiply(k, lambda, pulled);
+        }
         let mut first = 0;
         for (block, choice) in island.blocks.iter().zip(choices).filter(|(_, choice)| choice.is_coupled()) {
             let point = at.point(block);
             let f = point.function(block, *choice);
             let Derivative { by_lambda, by_w } = Derivative::new(block, &point, *choice);
-            let pulls = [0, 1, 2].map(|i| if i < block.rows { pulled(block.row + i) } else { 0.0 });
+            let pulls = [0, 1, 2].map(|i| if i < block.rows { pulled[block.row + i] } else { 0.0 });
             for i in 0..block.rows {
                 let row = &mut matrix[(first + i) * n..][..n];
                 for (j, weight) in by_w[i].iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
                     if j < block.rows {
                         let from = &k[(block.row + j) * count..][..count];
-                        row.iter_mut().zip(&*coupled).for_each(|(x, &at)| *x += weight * from[at]);
+                        let mut rest = &mut row[..];
+                        for &[first, len] in &*stretches {
+                            let (own, after) = rest.split_at_mut(len);
+                            own.iter_mut().zip(&from[first..]).for_each(|(x, from)| *x += weight * from);
+                            rest = after;
+                        }
                     }
                 }
                 (0..block.rows).for_each(|j| row[first + j] += by_lambda[i][j]);
@@ -306,11 +342,11 @@ impl<'a> SmallIsland<'a> {
             first += block.rows;
         }
         if !dense::solve(matrix, right) {
-            return None;
+            return false;
         }
         coupled.iter().zip(&*right).for_each(|(&at, x)| lambda[at] = *x);
-        let w = self.times(&lambda);
-        Some(Iterate { lambda, w })
+        self.multiply(change);
+        true
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::contact::random_rows;
 use super::{Bodies, FAR, Random, UP, all, distance, free, solve};
-use crate::constraint::rows::RowSet;
+use crate::constraint::rows::{RowSet, Rows};
 use crate::solver::{GaussSeidel, LcpPyramid, LcpSliding, RowSolver, residual};
 
 const G: f64 = 9.81;
@@ -147,5 +147,32 @@ fn dead_rows_get_no_multiplier() {
             solver.name(),
             solved.lambda
         );
+    }
+}
+
+/// A foot of a robot that moves in a plane: across it a force moves nothing, whatever way the tangents point.
+#[test]
+fn a_contact_in_a_plane_sticks_at_once_and_slides_as_coulomb_says() {
+    let (normal, along) = ([0.9, 1.0], [1.0, -0.2]);
+    for heading in [0.0f64, 0.3, 1.5707963, 2.0] {
+        let tangents = [heading.cos(), heading.sin()];
+        let mut rows = Rows::default();
+        rows.clear(2);
+        rows.push_block(RowSet::Cone { mu: 1.5 });
+        let y = rows.side(0, 2).expect("first side");
+        (0..2).for_each(|i| y[i] = normal[i]);
+        for (k, share) in tangents.iter().enumerate() {
+            (0..2).for_each(|i| y[2 * (k + 1) + i] = share * along[i]);
+        }
+        // the velocity that a normal impulse of 2 and a tangential one of `stops` bring to rest
+        let velocity = |stops: f64| [0, 1].map(|i| -2.0 * normal[i] - stops * along[i]);
+        let stuck = solve(&GaussSeidel, &rows, &free(&rows, &velocity(1.0)), FAR);
+        let expected = [2.0, tangents[0], tangents[1]];
+        assert!(distance(&stuck.lambda, &expected) < 1e-12, "{heading}: {:?}", stuck.lambda);
+        assert!(stuck.outcome.iterations <= 2, "{heading}: {}", stuck.outcome.iterations);
+        let slides = solve(&GaussSeidel, &rows, &free(&rows, &velocity(4.0)), FAR);
+        let [n, t] = [slides.lambda[0], tangents[0] * slides.lambda[1] + tangents[1] * slides.lambda[2]];
+        let after = tangents[0] * slides.w[1] + tangents[1] * slides.w[2];
+        assert!((t - 1.5 * n).abs() < 1e-12 && after < -0.1 && slides.w[0].abs() < 1e-12, "{heading}: {n} {t} {after}");
     }
 }

@@ -45,7 +45,7 @@ pub(super) struct FreeTerms {
 impl FreeTerms {
     pub fn new(middle: &mut Moment, core: &Core, h: f64) -> FreeTerms {
         let some = |v: Vec<f64>| v.iter().any(|x| *x != 0.0).then_some(v);
-        let turning = some(gyroscopic(middle.coordinates(core)));
+        let turning = gyroscopic(middle.coordinates(core)).and_then(some);
         FreeTerms { turning, change: some(free_motion_change(middle.coordinates(core), 0.5 * h)) }
     }
 
