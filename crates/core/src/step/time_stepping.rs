@@ -256,7 +256,7 @@ impl TimeStepping {
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
-            if constraint.moved.changes() && moving::touches(core, constraint) {
+            if constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
                 moving::add_motion(work, i, &free, h);
             }
         }
