@@ -33,7 +33,7 @@ const TURN: (f64, f64) = (1e-6, 2e-3);
 /// Largest error of a sub-step with `dormand_prince`, in integrator tolerances.
 pub(super) const SAFETY: f64 = 10.0;
 
-/// What a sub-step changes, before it.
+/// The values that a sub-step changes, before it.
 pub(super) struct Before {
     state: WorldState,
     report: StepReport,

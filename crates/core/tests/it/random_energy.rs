@@ -101,9 +101,9 @@ fn bar(gravity: bool) -> f64 {
     if gravity { 1e-3 } else { 1e-12 }
 }
 
-/// A scene with gravity in which the correction lifts heavy bodies that a light one is wedged under at 60 Hz, by 1.0e-3 of the
-/// energy; of the other 299 one is above 1e-4.
-const WEDGED: (u64, f64) = (165, 1.2e-3);
+/// A scene with gravity whose energy rises by 1.0e-3 at 60 Hz, for a reason that has not been found, and its bound; of the other
+/// 299 one is above 1e-4.
+const RISES: (u64, f64) = (165, 1.2e-3);
 
 /// 300 scenes of `time_stepping` and 40 of `backtracking` at three rates; 8 at 60 and 240 Hz without `TUMBLE_SLOW`.
 #[test]
@@ -146,7 +146,7 @@ fn random_scenes_gain_no_energy_full_length() {
                     above(|e| e.overlap, 2e-4)
                 );
                 let bar = bar(gravity);
-                let bar = if gravity && rise.1 == WEDGED.0 { WEDGED.1 } else { bar };
+                let bar = if gravity && rise.1 == RISES.0 { RISES.1 } else { bar };
                 assert!(rise.0 < bar, "{name}, seed {}: energy rises by {:e} of it", rise.1, rise.0);
                 let deepest = if rate < 200.0 { 2e-2 } else { 1e-3 };
                 assert!(overlap.0 < deepest, "{name}, seed {}: overlap {:e} m", overlap.1, overlap.0);
