@@ -228,3 +228,15 @@ pub(crate) fn move_in_step(core: &Core, constraint: &mut ContactConstraint, time
     constraint.move_to(time, parts, |part| entry(part).moves(), shape);
     constraint.moved.time > 0.0
 }
+
+/// Returns the present motion of a contact, with that of a lowest point along its rim.
+pub(crate) fn of(core: &Core, constraint: &ContactConstraint) -> ContactMotion {
+    let parts = [constraint.a, constraint.b].map(|part| &core.derived.part_states[part as usize]);
+    let shape = |part: u32| {
+        let owner = core.owners[part as usize];
+        core.objects().at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
+    };
+    let mut motion = constraint.motion(parts[0], parts[1]);
+    motion.point_rate += constraint.along_rim(&motion, parts, shape);
+    motion
+}

@@ -39,7 +39,7 @@ use super::impact::{self, Candidate};
 use super::patch::solve_patches;
 use super::slide_end::SlideEnds;
 use super::warm_start::{row_starts, warm_start};
-use super::{StepContext, Stepper, TimeStepping, Workspace};
+use super::{StepContext, Stepper, TimeStepping, Workspace, extrapolation};
 use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
@@ -87,10 +87,23 @@ const TRIES: u32 = 200;
 const STIFF: f64 = 0.5;
 /// Least sub-step, as a fraction of the frame.
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
+/// Shortest sub-step to which the error of contacts that move leads, as a fraction of the frame.
+const SHORTEST: f64 = 1.0 / 64.0;
 /// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 200;
 /// Maximum number of corrections of a time found by dense output, before the dense state is taken.
 const CORRECTIONS: u32 = 2;
+
+/// Returns the length of the sub-step after one of `h` seconds that covered `went` (0: it is to be taken again) with an error.
+fn next_length(core: &Core, (h, went): (f64, f64), error: f64) -> f64 {
+    if core.settings.integrator != Integrator::DormandPrince {
+        return core.settings.dt;
+    }
+    // the error of a sub-step is of third order
+    let goal = 0.5 * extrapolation::SAFETY * core.settings.integrator_tolerance;
+    let factor = (goal / error.max(f64::MIN_POSITIVE)).cbrt();
+    h * if went == 0.0 { factor.clamp(0.1, 0.5) } else { factor.clamp(0.5, 2.0) }
+}
 
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
 fn is_soft(target: &RowTarget) -> bool {
@@ -141,24 +154,71 @@ impl Backtracking {
     fn piece(&mut self, core: &mut Core, end: f64) -> Result<(), StepError> {
         let (dt, most) = (core.settings.dt, TRIES * core.division);
         let mut left = if core.division == 1 { dt } else { end - core.state.time };
+        let floor = dt * SHORTEST;
         self.slides.solves = 0;
+        let mut longest = left;
         while left > 1e-12 * dt {
             if core.report.tries >= most || !core.meter.start_try(core.settings.solver_settings.budget) {
                 core.report.floor_hits += 1;
                 self.fallback.substep(core, left)?;
                 break;
             }
-            core.by_impulses = false;
-            self.gather(core, left)?;
-            self.roles(core);
-            if self.resolve_impacts(core) {
-                self.gather(core, left)?;
-                self.roles(core);
+            let h = longest.min(left);
+            self.meet(core, h)?;
+            if !extrapolation::is_needed(core, &self.work, &self.watch.roles, h) {
+                left -= self.motion(core, h)?;
+                continue;
             }
-            left -= self.motion(core, left)?;
+            let (went, error) = self.extrapolated(core, h, floor)?;
+            left -= went;
+            longest = next_length(core, (h, went), error).max(floor);
         }
         core.state.time = end; // whatever the sub-steps add up to
         Ok(())
+    }
+
+    /// Computes contacts and rows for a sub-step of `h` seconds, and resolves impacts.
+    fn meet(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+        core.by_impulses = false;
+        self.gather(core, h)?;
+        self.roles(core);
+        if self.resolve_impacts(core) {
+            self.gather(core, h)?;
+            self.roles(core);
+        }
+        Ok(())
+    }
+
+    /// Advances by a sub-step of `h` seconds whose contacts move, extrapolated (`extrapolation.rs`). Returns its length, s, and its
+    /// error; 0 for both if it has to be taken again with a shorter one.
+    fn extrapolated(&mut self, core: &mut Core, h: f64, floor: f64) -> Result<(f64, f64), StepError> {
+        let before = extrapolation::Before::of(core);
+        let whole = self.motion(core, h)?;
+        if core.report.tries >= TRIES * core.division {
+            return Ok((whole, 0.0));
+        }
+        let coarse = core.state.x.to_vec();
+        let carrying = |core: &Core| core.state.warm.keys().copied().collect::<Vec<_>>();
+        let (keys, mut same) = (carrying(core), true);
+        before.restore(core);
+        for half in [0.0, 0.5] {
+            self.meet(core, 0.5 * whole)?;
+            let went = self.motion(core, 0.5 * whole)?;
+            if went < 0.499_999 * whole {
+                return Ok((half * whole + went, 0.0));
+            }
+            same &= carrying(core) == keys;
+        }
+        if !same && (core.settings.integrator != Integrator::DormandPrince || whole <= floor) {
+            return Ok((whole, 0.0));
+        }
+        let error = extrapolation::combine(core, &coarse);
+        let exact = core.settings.integrator == Integrator::DormandPrince;
+        if exact && error > extrapolation::SAFETY * core.settings.integrator_tolerance && whole > floor {
+            before.restore(core);
+            return Ok((0.0, error));
+        }
+        Ok((whole, error))
     }
 
     /// Advances to the next event, at most for `left` seconds. Returns the length of the sub-step, s.

@@ -8,6 +8,7 @@ mod contacts;
 mod context;
 mod correction;
 mod event_location;
+mod extrapolation;
 mod held_forces;
 mod impact;
 mod islands;

@@ -34,6 +34,7 @@
 //! gap per step. Elastic contacts keep the energy exactly: they have no row in this step, their
 //! overlap is corrected at its end, and they strike at the start of the next.
 
+mod at_end;
 mod impacts;
 mod lift;
 mod moving;
@@ -59,6 +60,7 @@ use crate::settings::Settings;
 use crate::solver::SolverSettings;
 use crate::world::view::Entry;
 use crate::world::{Coordinates, Core, StepError};
+use at_end::Taken;
 use moving::FreeTerms;
 
 /// The default stepper, `time_stepping`.
@@ -66,6 +68,9 @@ use moving::FreeTerms;
 pub struct TimeStepping {
     work: Workspace,
     probe: Workspace,
+    /// Contacts at the end of the step.
+    end: Workspace,
+    taken: Taken,
     x0: Vec<f64>,
     /// Fraction of the step before the first impact, per coordinate; negative without an impact.
     impact_fraction: Vec<f64>,
@@ -137,7 +142,8 @@ impl TimeStepping {
         let mut middle = core.moment();
         self.advance(core, &mut middle, h)?;
         core.moments.push(middle);
-        core.finish_substep(h)
+        core.finish_substep(h)?;
+        self.separate_at_end(core, h)
     }
 
     /// Writes the state at the end of the sub-step. `middle` becomes the moment at which impulses
@@ -250,7 +256,7 @@ impl TimeStepping {
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
-            if constraint.moved.changes() && moving::touches(core, constraint) {
+            if constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
                 moving::add_motion(work, i, &free, h);
             }
         }
@@ -340,8 +346,9 @@ impl TimeStepping {
         shift(core.coordinates(Some(&mut *middle)), rest, h);
         write(mean, n, |i| impact_fraction(i) * u0[i] + (1.0 - impact_fraction(i)) * u1[i] + parabola[i]);
         rest.clone_from(mean);
-        self.work.frictionless.du.clear();
         self.correct(core, middle, h, ([u0, u1], du_force))?;
+        let lambda: Vec<f64> = self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b).collect();
+        self.keep(core, [u0, u1], du_force, &lambda);
         let Buffers { dp, total, keep, moved, rest: mean, end, .. } = &mut self.buffers;
         total.clear();
         total.extend(self.work.lambda.iter().zip(&self.impact).map(|(a, b)| a + b));

@@ -48,7 +48,7 @@ pub(super) struct Step<'a> {
 }
 
 /// Iterates over the coordinates of both sides of a block.
-fn coordinates(block: &Block) -> impl Iterator<Item = usize> + '_ {
+pub(super) fn coordinates(block: &Block) -> impl Iterator<Item = usize> + '_ {
     block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize)
 }
 

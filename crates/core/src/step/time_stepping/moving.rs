@@ -14,7 +14,7 @@ use tumble_collide::Vec3;
 /// what passes them keeps its distance; those that may bounce get their rates.
 pub(super) fn move_contacts(core: &Core, contacts: &mut [ContactConstraint], time: f64) {
     for constraint in contacts {
-        let touches = touches(core, constraint);
+        let touches = touches(core, constraint, time);
         let may_bounce = constraint.restitution > 0.0 && constraint.found_at == 0.0;
         if touches || may_bounce {
             let before = constraint.frame;
@@ -27,9 +27,12 @@ pub(super) fn move_contacts(core: &Core, contacts: &mut [ContactConstraint], tim
     }
 }
 
-/// Returns whether a contact is closed at the start of the step.
-pub(super) fn touches(core: &Core, constraint: &ContactConstraint) -> bool {
-    constraint.contact.gap <= core.settings.drift_tolerance
+/// Returns whether a contact is closed at the start of the step and still is `time` seconds later: one that opens does
+/// not last, and with its motion it might push.
+pub(super) fn touches(core: &Core, constraint: &ContactConstraint, time: f64) -> bool {
+    let [a, b] = [constraint.a, constraint.b].map(|part| &core.derived.part_states[part as usize]);
+    let opening = time * constraint.velocity(a, b).dot(&constraint.contact.normal);
+    constraint.contact.gap + opening.max(0.0) <= core.settings.drift_tolerance
 }
 
 /// Terms of the whitened velocities that change the velocities of rows in free motion; `None` if all
