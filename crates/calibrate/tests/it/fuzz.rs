@@ -148,7 +148,8 @@ fn changed_photographs_are_read_or_refused_full_length() {
 #[test]
 fn changed_configurations_are_read_or_refused_full_length() {
     let is_read = |bytes: &[u8]| {
-        std::str::from_utf8(bytes).is_ok_and(|text| sgct_to_cave(text).is_ok() || parse_marks(text, "marks.toml").is_ok())
+        std::str::from_utf8(bytes)
+            .is_ok_and(|text| sgct_to_cave(text).is_ok() || parse_marks(text, "marks.toml").is_ok())
     };
     fuzz("sgct", sgct_target::target, is_read);
 }

@@ -2006,8 +2006,8 @@ class Articulation:
         """Sets the drives of all degrees of freedom of a body in a world at once, in the order of ``qd``.
 
         Arguments as in ``set_drive``: a number for all that can have a drive, or shape (dof,). Degrees of freedom whose numbers are
-        all 0 or None have no drive then. A ``target`` with neither
-        ``stiffness`` nor ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
+        all 0 or None have no drive then. A ``target`` without
+        ``stiffness`` and ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
         """
     def apply_force(self, link: str, force: ArrayLike, point: ArrayLike | None = None) -> None:
         """Applies a force to a link of a body in a world during the next step only. force: shape (3,),

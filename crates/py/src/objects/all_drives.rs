@@ -14,7 +14,7 @@ pub struct AllDrives {
 }
 
 impl AllDrives {
-    /// Returns the drives of a body, one for each degree of freedom. A setting that is one number for all says nothing about degrees of
+    /// Returns the drives of a body, one for each degree of freedom. A setting with the same number for all leaves out degrees of
     /// freedom that cannot have a drive.
     pub fn drives(&self, body: &ArticulatedBody) -> Result<Vec<Drive>> {
         let gains = self.stiffness.is_some() || self.damping.is_some();

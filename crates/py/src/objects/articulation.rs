@@ -454,8 +454,8 @@ impl Articulation {
     /// Sets the drives of all degrees of freedom of a body in a world at once, in the order of ``qd``.
     ///
     /// Arguments as in ``set_drive``: a number for all that can have a drive, or shape (dof,). Degrees of freedom whose numbers are
-    /// all 0 or None have no drive then. A ``target`` with neither
-    /// ``stiffness`` nor ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
+    /// all 0 or None have no drive then. A ``target`` without
+    /// ``stiffness`` and ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
     #[pyo3(
         signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None, **unknown),
         text_signature = "($self, *, target=None, velocity=None, stiffness=None, damping=None, max_force=None)"
