@@ -40,9 +40,9 @@ fn axes_have_letters() {
     assert_eq!(format!("{:?}", letters.articulated), format!("{:?}", numbers.articulated));
     assert_eq!(format!("{:?}", letters.loop_joints), format!("{:?}", numbers.loop_joints));
     assert_eq!(format!("{:?}", letters.bodies), format!("{:?}", numbers.bodies));
-    let states = [&letters, &numbers].map(|scene| scene.build().unwrap().state().to_vec());
+    let states = [&letters, &numbers].map(|scene| scene.build().unwrap().0.state().to_vec());
     assert_eq!(states[0], states[1]);
-    let Joint::Revolute { axis } = letters.articulated[0].links[0].joint.joint else { panic!("a hinge") };
+    let Joint::Revolute { axis } = letters.articulated[0].links[0].joint.kind else { panic!("a hinge") };
     assert_eq!(axis, Vec3::new(0.0, 0.0, -1.0));
     assert_errors(
         &link_with("").replace("[0, 0, 2]", "\"w\""),
