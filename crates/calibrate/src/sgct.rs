@@ -167,11 +167,11 @@ fn facet(name: &str, window: &At<'_>, viewport: &At<'_>, users: &[User<'_>], out
     }
     // its pixels are counted from the lower left corner of the window, and the first one is the left eye's
     let [x, y] = [0, 1].map(|k| (size[k] * at[k]).round() as i64);
-    let lower_row = y + px[1] as i64 - 1;
+    let lower_row = y.saturating_add(px[1] as i64 - 1);
     let inverted = window.text("stereo").is_some_and(|word| word.ends_with("_inverted"));
     let swap_eyes = match stereo {
         "rows" => (lower_row % 2 != 0) != inverted,
-        "checkerboard" => ((x + lower_row) % 2 != 0) != inverted,
+        "checkerboard" => ((x % 2 + lower_row % 2) % 2 != 0) != inverted,
         _ => false,
     };
     let corner = window.pair("pos", [0.0; 2])?;

@@ -9,6 +9,7 @@ mod extension;
 mod faults;
 mod interrupt;
 mod io;
+mod keywords;
 mod objects;
 mod pool;
 mod script;

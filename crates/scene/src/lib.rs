@@ -84,6 +84,7 @@ pub use open::plain::{open_file, read_file};
 pub use open::shipped::{SceneSource, Shipped, resolve_scene, shipped};
 pub use parse::appearance::{AppearanceSpec, Color, Pattern};
 pub use parse::articulated::ArticulatedSpec;
+pub use parse::axis::axis_by_name;
 pub use parse::behavior::BehaviorSpecs;
 pub use parse::behavior::field::{FieldKind, FieldSpec, PanelSpec};
 pub use parse::behavior::flock::{BodyFlockSpec, BoidGroupSpec, FlockSpec};

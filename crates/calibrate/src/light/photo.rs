@@ -49,10 +49,17 @@ impl Photo {
         if length > MAX_BYTES {
             return Err(format!("has {length} bytes, and at most {MAX_BYTES} are read"));
         }
-        let bytes = tumble_scene::read_file(path).map_err(unread)?;
-        match bytes.as_slice() {
-            [0xff, 0xd8, ..] => Photo::from_jpeg(&bytes),
-            [0x89, b'P', b'N', b'G', ..] => Photo::from_png(&bytes),
+        Photo::parse(&tumble_scene::read_file(path).map_err(unread)?)
+    }
+
+    /// Parses the bytes of a PNG or JPEG file: at most 16384 pixels a side, 2²⁶ pixels.
+    ///
+    /// # Errors
+    /// The fault.
+    pub fn parse(bytes: &[u8]) -> Result<Photo, String> {
+        match bytes {
+            [0xff, 0xd8, ..] => Photo::from_jpeg(bytes),
+            [0x89, b'P', b'N', b'G', ..] => Photo::from_png(bytes),
             _ => Err("is no PNG and no JPEG file".into()),
         }
     }

@@ -1,10 +1,16 @@
-//! The fuzz targets of mesh files and of sphere trees, run without a fuzzer: on their seeds, and on these with bytes
+//! The fuzz targets of mesh files, sphere trees and cached shapes, run without a fuzzer: on their seeds, and on these with bytes
 //! flipped, replaced by numbers and words, pieces repeated or lost, and ends cut off. `TUMBLE_SLOW=1` runs 200,000 of each.
 
 use crate::rng::Rng;
+use serde::Deserialize;
+use serde::de::value::SeqDeserializer;
 use std::path::Path;
 use std::time::Instant;
+use tumble_collide::{MeshShape, TreeSettings, TriMesh, Vec3};
 
+#[allow(unused_attributes, unused_imports)]
+#[path = "../../../../fuzz/fuzz_targets/cached_shape.rs"]
+mod cached_shape;
 #[allow(unused_attributes, unused_imports)]
 #[path = "../../../../fuzz/fuzz_targets/obj.rs"]
 mod obj;
@@ -124,4 +130,25 @@ fn changed_obj_files_give_meshes_or_errors_full_length() {
 fn changed_sphere_trees_give_trees_or_errors_full_length() {
     let is_read = |bytes: &[u8]| tumble_collide::TreeFile::from_json(&text(bytes)).is_ok();
     fuzz("sphere_tree", |bytes| sphere_tree::target(&text(bytes)), is_read);
+}
+
+/// The bytes of a mesh shape without the checksum before them.
+fn bytes_of(mesh: TriMesh) -> Vec<u8> {
+    let shape = MeshShape::new(mesh, &TreeSettings::octree()).unwrap();
+    serde_json::from_slice(&serde_json::to_vec(&shape).unwrap()).unwrap()
+}
+
+/// `TUMBLE_KEEP_SEEDS=1` writes the seeds anew, in the present format.
+#[test]
+fn changed_cached_shapes_give_shapes_or_errors_full_length() {
+    if std::env::var_os("TUMBLE_KEEP_SEEDS").is_some() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/cached_shape");
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("box"), bytes_of(TriMesh::cuboid(Vec3::new(0.2, 0.4, 0.6)))).unwrap();
+        std::fs::write(folder.join("ring"), bytes_of(TriMesh::torus(0.3, 0.1, 5, 4))).unwrap();
+    }
+    let is_read = |bytes: &[u8]| {
+        MeshShape::deserialize(SeqDeserializer::<_, serde::de::value::Error>::new(bytes.iter().copied())).is_ok()
+    };
+    fuzz("cached_shape", cached_shape::target, is_read);
 }

@@ -94,6 +94,18 @@ pub enum ArticulatedError {
         /// Required number of values.
         expected: usize,
     },
+    /// A list has another length than the degrees of freedom.
+    #[error("articulated body '{body}': {got} {what}; there must be {expected}, one for each degree of freedom")]
+    Length {
+        /// Body.
+        body: String,
+        /// Contents of the list.
+        what: &'static str,
+        /// Length of the list.
+        got: usize,
+        /// Degrees of freedom.
+        expected: usize,
+    },
 }
 
 /// A tree of links that moves as one object. See the module for its state.
@@ -379,6 +391,31 @@ impl ArticulatedBody {
         }
         self.dofs[index] = dof;
         Ok(())
+    }
+
+    /// Sets the drives of all degrees of freedom, in the order of `v`. An invalid one changes nothing.
+    ///
+    /// # Errors
+    /// As [`set_dof`](Self::set_dof); [`ArticulatedError::Length`] if there are not as many as degrees of freedom.
+    pub fn set_drives(&mut self, drives: &[super::Drive]) -> Result<(), ArticulatedError> {
+        let before = self.dofs.clone();
+        if drives.len() != before.len() {
+            return Err(ArticulatedError::Length {
+                body: self.name.clone(),
+                what: "drives",
+                got: drives.len(),
+                expected: before.len(),
+            });
+        }
+        let set = |(index, drive): (usize, &super::Drive)| {
+            let drive = drive.clone();
+            self.set_dof(index, DofSettings { drive, ..before[index].clone() })
+        };
+        let outcome = drives.iter().enumerate().try_for_each(set);
+        if outcome.is_err() {
+            self.dofs = before;
+        }
+        outcome
     }
 
     /// Sets the [`armature`](super::Link::armature) of the joint that moves a link, kg·m² or kg. In a world

@@ -19,10 +19,10 @@ impl ArticulatedBody {
     pub(super) fn has_rows(&self) -> bool {
         let rows = |f: &DofSettings| {
             let resists = f.friction > 0.0 || f.damping > 0.0 || f.max_velocity.is_finite();
-            resists || f.limits.is_some() || f.twist_limits.is_some() || f.drive != Drive::None
+            let holds = f.limits.is_some() || f.twist_limits.is_some() || f.drive != Drive::None;
+            resists || holds || f.spring.is_some()
         };
-        let sprung = |(k, f): (usize, &DofSettings)| f.spring.is_some() && self.has_soft_spring(k);
-        !self.couplings.is_empty() || self.dofs().iter().any(rows) || self.dofs().iter().enumerate().any(sprung)
+        !self.couplings.is_empty() || self.dofs().iter().any(rows)
     }
 
     /// Calls `act` with each degree of freedom: the index of its velocity, its state and the position that springs see. Positions are 0
@@ -45,35 +45,13 @@ impl ArticulatedBody {
         }
     }
 
-    /// Returns whether the spring of a degree of freedom is a row wherever soft forces are rows.
-    fn has_soft_spring(&self, index: usize) -> bool {
-        self.position_of(index).is_none()
-    }
-
-    /// Calls `row` with the targets of the rows of a degree of freedom that carry forces: spring, dry friction, damping, drive.
-    fn forces_of(
-        &self,
-        (index, dof, sprung): (usize, &DofState, f64),
-        (level, time): (Level, f64),
-        mut row: impl FnMut(RowTarget),
-    ) {
-        if dof.settings.spring.is_some() && self.has_soft_spring(index) {
-            dof.spring(level, sprung).into_iter().for_each(&mut row);
-        }
-        dof.forces(level, time, row);
-    }
-
-    /// Adds the forces of springs and, where rows are not implicit, of damping and position drives.
+    /// Adds the forces of springs, damping and position drives where they are no rows.
     pub(super) fn joint_forces(&self, x: &[f64], implicit: bool, time: f64, out: &mut [f64]) {
-        if implicit && self.dofs().iter().all(|settings| settings.spring.is_none()) {
+        if implicit {
             return;
         }
-        self.each_dof(x, time, |index, dof, sprung| {
-            let DofState { q, v, settings, .. } = dof;
-            if settings.spring.is_some() && !(implicit && self.has_soft_spring(index)) {
-                out[index] += settings.spring_force(sprung);
-            }
-            out[index] += if implicit { 0.0 } else { settings.explicit_force(q, v) };
+        self.each_dof(x, time, |index, DofState { q, v, settings, .. }, sprung| {
+            out[index] += settings.spring_force(sprung) + settings.explicit_force(q, v);
         });
     }
 
@@ -87,9 +65,9 @@ impl ArticulatedBody {
         self.each_velocity_limit(x, |_, _, _| limits += 1);
         let targets = |level: Level| -> Vec<usize> {
             let mut counts = Vec::with_capacity(self.dofs().len());
-            self.each_dof(x, time, |index, dof, sprung| {
+            self.each_dof(x, time, |_, dof, sprung| {
                 let mut count = 0;
-                self.forces_of((index, &dof, sprung), (level, time), |_| count += 1);
+                forces_of(&dof, sprung, (level, time), |_| count += 1);
                 counts.push(count);
             });
             counts
@@ -102,8 +80,7 @@ impl ArticulatedBody {
             let count = counts.next().unwrap_or(0);
             end += count;
             let damping = dof.settings.damping * dof.v;
-            let spring = dof.settings.spring.is_some() && self.has_soft_spring(index);
-            let springs = usize::from(spring && dof.spring(level, sprung).is_some());
+            let springs = usize::from(dof.spring(level, sprung).is_some());
             let resisting = usize::from(dof.settings.friction > 0.0) + usize::from(dof.settings.damping > 0.0);
             out[index] += h * match (dof.drive(level, time), level.soft_step()) {
                 (Some(_), soft) if count > 0 => {
@@ -181,7 +158,7 @@ impl Constraint for ArticulatedBody {
         });
         self.each_velocity_limit(x, |index, sign, target| maker.row_of(target, index, sign));
         self.each_dof(x, view.time, |index, dof, sprung| {
-            self.forces_of((index, &dof, sprung), (level, view.time), |target| maker.row_of(target, index, 1.0));
+            forces_of(&dof, sprung, (level, view.time), |target| maker.row_of(target, index, 1.0));
         });
         for c in &self.couplings {
             let position = |dof| self.position_of(dof).map_or(0.0, |q| x[q]);
@@ -202,6 +179,12 @@ impl Constraint for ArticulatedBody {
     fn reads_part_states(&self) -> bool {
         false
     }
+}
+
+/// Calls `row` with the targets of the rows of a degree of freedom that carry forces: spring, dry friction, damping, drive.
+fn forces_of(dof: &DofState, sprung: f64, (level, time): (Level, f64), mut row: impl FnMut(RowTarget)) {
+    dof.spring(level, sprung).into_iter().for_each(&mut row);
+    dof.forces(level, time, row);
 }
 
 /// A limit of a joint.

@@ -17,7 +17,7 @@ pub enum Level {
     Acceleration {
         /// Length of the sub-step, s.
         h: f64,
-        /// Time after its start, s, at which soft forces (damping, position drives, springs of loop
+        /// Time after its start, s, at which soft forces (damping, position drives, springs of
         /// joints) act, if they are rows; `None` if they are forces.
         soft: Option<f64>,
     },

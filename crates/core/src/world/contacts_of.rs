@@ -1,6 +1,6 @@
 //! Queries of contacts.
 
-use super::{ContactPoint, World};
+use super::{ContactPoint, World, WorldError};
 use crate::world::view::ObjectId;
 use tumble_collide::Vec3;
 
@@ -9,6 +9,53 @@ impl World {
     /// removed.
     pub fn contacts_of(&self, id: ObjectId) -> impl Iterator<Item = &ContactPoint> + use<'_> {
         self.contacts().iter().filter(move |contact| contact.a == id || contact.b == id)
+    }
+
+    /// Returns the sum of the contact forces of `a` on `b` in the last sub-step, N, world axes, without impacts; zero if they do not
+    /// touch. The sum of `b` on `a` is the opposite.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if an object was removed.
+    ///
+    /// ```
+    /// use tumble_core::prelude::*;
+    /// let mut world = World::default();
+    /// let ground = world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground"))?;
+    /// let ball = RigidBody::new(Shape::sphere(0.1)?).with_name("ball").with_mass(2.0);
+    /// let ball = world.add(ball.with_pose(Pose::translation(0.0, 0.0, 0.1)))?;
+    /// world.step()?;
+    /// assert!((world.contact_force(ground, ball)?.z - 2.0 * 9.81).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn contact_force(&self, a: ObjectId, b: ObjectId) -> Result<Vec3, WorldError> {
+        self.contact_force_of((a, None), (b, None))
+    }
+
+    /// As [`contact_force`](Self::contact_force), between some parts of each, such as [those of a
+    /// link](crate::ArticulatedBody::parts_of_link), also of one object; `None` stands for all.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if an object was removed.
+    pub fn contact_force_of(
+        &self,
+        a: (ObjectId, Option<&[usize]>),
+        b: (ObjectId, Option<&[usize]>),
+    ) -> Result<Vec3, WorldError> {
+        for (id, _) in [a, b] {
+            self.object(id).ok_or(WorldError::Stale)?;
+        }
+        let of = |(id, parts): (ObjectId, Option<&[usize]>), other: ObjectId, part: usize| {
+            id == other && parts.is_none_or(|parts| parts.contains(&part))
+        };
+        Ok(self.contacts().iter().fold(Vec3::zeros(), |mut sum, c| {
+            if of(b, c.a, c.part_a) && of(a, c.b, c.part_b) {
+                sum += c.force;
+            }
+            if of(a, c.a, c.part_a) && of(b, c.b, c.part_b) {
+                sum -= c.force;
+            }
+            sum
+        }))
     }
 }
 

@@ -256,7 +256,7 @@ pub struct WorldView<'a> {
     pub time: f64,
     /// Gravity, m/s².
     pub gravity: Vec3,
-    /// Whether soft forces (damping, position drives, springs of loop joints) are implicit rows of a
+    /// Whether soft forces (damping, position drives, springs of joints) are implicit rows of a
     /// [`Constraint`](crate::Constraint) in this step: see [`Level::soft_step`](crate::Level::soft_step).
     /// Otherwise such forces belong to the force table.
     pub implicit: bool,

@@ -26,6 +26,39 @@ fn a_ball_at_rest_touches_the_ground_and_another_in_the_air_touches_nothing() {
     assert_eq!(world.contacts_of(high).count(), 0);
 }
 
+/// A stack of two balls and one beside it: the ground carries both of the stack, and forces come in pairs.
+#[test]
+fn the_contact_force_of_two_bodies_carries_the_weight_between_them() {
+    for stepper in ["time_stepping", "backtracking"] {
+        let mut world = World::default();
+        world.set_stepper(tumble_core::stepper_by_name(stepper).unwrap());
+        let ground = world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground")).unwrap();
+        let (low, high) = (world.add(ball("low", 0.1)).unwrap(), world.add(ball("high", 0.3)).unwrap());
+        let beside = ball("beside", 0.1).with_pose(Pose::translation(1.0, 0.0, 0.1));
+        let beside = world.add(beside).unwrap();
+        for _ in 0..3 {
+            world.step().unwrap();
+        }
+        let weight = 2.0 * 9.81;
+        for (a, b, wanted) in [
+            (ground, low, 2.0 * weight),
+            (low, ground, -2.0 * weight),
+            (low, high, weight),
+            (ground, beside, weight),
+            (ground, high, 0.0),
+            (low, low, 0.0),
+        ] {
+            let force = world.contact_force(a, b).unwrap();
+            assert!((force - Vec3::new(0.0, 0.0, wanted)).norm() < 1e-6, "{stepper}: {force:?} instead of {wanted}");
+        }
+        let part = world.contact_force_of((ground, Some(&[0])), (low, Some(&[0]))).unwrap();
+        assert_eq!(part, world.contact_force(ground, low).unwrap());
+        assert_eq!(world.contact_force_of((ground, Some(&[7])), (low, None)).unwrap(), Vec3::zeros());
+        world.remove(high).unwrap();
+        assert!(matches!(world.contact_force(ground, high), Err(WorldError::Stale)));
+    }
+}
+
 /// A ball of water with a radius of 0.1 m: `m = 1000·4/3·π·r³`, `I = 2/5·m·r²`.
 #[test]
 fn a_body_without_a_mass_has_the_density_of_water() {

@@ -78,6 +78,30 @@ fn a_drive_that_the_step_resolves_follows_the_damped_oscillator() {
     }
 }
 
+/// Two hinges, each with a drive of its own: both reach their targets. A wrong list changes nothing.
+#[test]
+fn all_drives_are_set_at_once_or_none() {
+    let mut world = world(1.0 / 240.0, "time_stepping", Integrator::Verlet);
+    world.set_settings(world.settings().with_gravity(Vec3::zeros())).unwrap();
+    let mut body = ArticulatedBody::new("arm", hinged(2, 0.6, rod(1.0, 0.6)));
+    let to = |target: f64, damping: f64| {
+        let (stiffness, velocity, limit) = (100.0, 0.0, f64::INFINITY);
+        Drive::Position { stiffness, damping, target, velocity, limit }
+    };
+    body.set_drives(&[to(0.4, 20.0), to(-0.7, 20.0)]).unwrap();
+    let before = body.dofs().to_vec();
+    let short = body.set_drives(&[Drive::None]).unwrap_err().to_string();
+    assert_eq!(short, "articulated body 'arm': 1 drives; there must be 2, one for each degree of freedom");
+    assert!(body.set_drives(&[Drive::None, to(0.0, -1.0)]).unwrap_err().to_string().contains("damping is -1"));
+    assert_eq!(body.dofs(), before);
+    let id = world.add(body).unwrap();
+    for _ in 0..2400 {
+        world.step().unwrap();
+    }
+    let x = world.state_of(id).unwrap();
+    assert!((x[0] - 0.4).abs() < 1e-6 && (x[1] + 0.7).abs() < 1e-6, "{x:?}");
+}
+
 /// The hinge of a loop joint between a fixed and a free body, I = 0.01 kg·m².
 #[test]
 fn a_stiff_drive_of_a_loop_joint_holds_in_backtracking() {

@@ -44,6 +44,7 @@ mod friction;
 mod hulls;
 mod impacts;
 mod internal_edges;
+mod joint_springs;
 mod limits;
 mod linearize;
 mod link_mass;

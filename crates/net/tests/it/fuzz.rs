@@ -36,6 +36,7 @@ targets! {
     netsync_recording "../../../../fuzz/fuzz_targets/netsync_recording.rs"
     browser "../../../../fuzz/fuzz_targets/browser.rs"
     console "../../../../fuzz/fuzz_targets/console.rs"
+    key "../../../../fuzz/fuzz_targets/key.rs"
     udp_packet "../../../../fuzz/fuzz_targets/udp_packet.rs"
     udp_session "../../../../fuzz/fuzz_targets/udp_session.rs"
 }

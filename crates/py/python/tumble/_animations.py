@@ -10,16 +10,20 @@ import struct
 import subprocess
 import threading
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tumble._errors import InvalidValueError, PictureError, UnreadableFileError
+
+if TYPE_CHECKING:
+    from tumble._native import World
+    from tumble._pictures import Camera
 
 _TIMEOUT = 60.0
 """Longest time that ffmpeg may take for one frame, or to end, s."""
@@ -77,6 +81,56 @@ def write_video(path: str | PathLike[str], shots: Iterable[Shot], fps: float) ->
             video.end()
         with suppress(FileNotFoundError):
             part.unlink()
+
+
+def of_world(
+    world: World, duration: float, size: tuple[int, int], fps: float, speed: float, camera: Camera | None, control: Callable[[World], object] | None
+) -> Animation:
+    """Returns an animation of a fork of a world."""
+    return Animation(_ahead(world, duration, size, fps, speed, camera, control), fps, "a world")
+
+
+def video_of_world(
+    world: World,
+    path: str | PathLike[str],
+    duration: float,
+    size: tuple[int, int],
+    fps: float,
+    speed: float,
+    camera: Camera | None,
+    control: Callable[[World], object] | None,
+) -> None:
+    """Writes a video of a fork of a world."""
+    shots = _ahead(world, duration, size, fps, speed, camera, control)
+    if Path(path).suffix.lower() in (".png", ".apng"):
+        Animation(shots, fps, "a world").save(in_a_folder(path))
+    else:
+        write_video(path, shots, fps)
+
+
+def _ahead(
+    world: World, duration: float, size: tuple[int, int], fps: float, speed: float, camera: Camera | None, control: Callable[[World], object] | None
+) -> Iterator[Shot]:
+    """Returns the images of a fork that is stepped for ``duration`` seconds."""
+    if not 0.0 < duration < float("inf"):
+        raise InvalidValueError(f"duration is {duration}; it must be finite and above 0")
+    if control is not None and not callable(control):
+        raise InvalidValueError(f"control is {control!r}; expected a function of a world")
+    fork = world.fork()
+    steps = max(1, round(duration / fork.dt))
+    chosen = instants(np.arange(steps + 1, dtype=np.float64) * fork.dt, fps, speed)
+    return _steps(fork, chosen, size, camera, control)
+
+
+def _steps(fork: World, chosen: list[int], size: tuple[int, int], camera: Camera | None, control: Callable[[World], object] | None) -> Iterator[Shot]:
+    step = 0
+    for k in chosen:
+        while step < k:
+            if control is not None:
+                control(fork)
+            fork.step()
+            step += 1
+        yield Shot(fork.time, fork.render(*size, camera=camera))
 
 
 class _Ffmpeg:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, disjoint_base
 
+from tumble._animations import Animation
 from tumble._extension import Behavior, Force, Intersect
 from tumble._pictures import Appearance
 from tumble._values import Energy, Event, Firing, LinkSpheres, Momentum, SphereLevel
@@ -121,10 +122,11 @@ class Sphere(Shape):
 
 @final
 class Box(Shape):
-    """A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
+    """A box about its center. size: full edge lengths along x, y and z, meters, shape (3,); one number is a cube. ``Box(0.4, 0.2, 0.1)``
+    is the same as ``Box((0.4, 0.2, 0.1))``.
     rounding: radius of edges and corners, meters, below half the shortest edge; the faces stay.
     """
-    def __new__(cls, size: ArrayLike, *, rounding: float = 0.0) -> Box: ...
+    def __new__(cls, size: ArrayLike, y: float | None = None, z: float | None = None, *, rounding: float = 0.0) -> Box: ...
 
 @final
 class Capsule(Shape):
@@ -157,8 +159,10 @@ class Cylinder(Shape):
 
 @final
 class Ellipsoid(Shape):
-    """An ellipsoid about its center. size: full axes along x, y and z, meters."""
-    def __new__(cls, size: ArrayLike) -> Ellipsoid: ...
+    """An ellipsoid about its center. size: full axes along x, y and z, meters, shape (3,), or three numbers one by one; one number is a
+    sphere.
+    """
+    def __new__(cls, size: ArrayLike, y: float | None = None, z: float | None = None) -> Ellipsoid: ...
 
 @final
 class Cone(Shape):
@@ -1460,7 +1464,7 @@ class ArticulationBuilder:
 
         parent: a link that was added before; None: the base. joint: ``"revolute"``, ``"prismatic"``,
         ``"spherical"``, ``"fixed"``, or ``"floating"`` without a parent. axis: of a revolute or
-        prismatic joint, shape (3,), any length above 0. position, orientation: the frame of the joint
+        prismatic joint, shape (3,), any length above 0, or ``"x"``, ``"-z"`` and so on. position, orientation: the frame of the joint
         in the frame of the parent, shape (3,), m, and (4,); with the joint at zero it is the frame of
         the link.
 
@@ -1989,6 +1993,21 @@ class Articulation:
         With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
         ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
         max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. ``save`` includes it.
+        """
+    def set_drives(
+        self,
+        *,
+        target: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        stiffness: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
+        max_force: ArrayLike | None = None,
+    ) -> None:
+        """Sets the drives of all degrees of freedom of a body in a world at once, in the order of ``qd``.
+
+        Arguments as in ``set_drive``: a number for all that can have a drive, or shape (dof,). Degrees of freedom whose numbers are
+        all 0 or None have no drive then. A ``target`` without
+        ``stiffness`` and ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
         """
     def apply_force(self, link: str, force: ArrayLike, point: ArrayLike | None = None) -> None:
         """Applies a force to a link of a body in a world during the next step only. force: shape (3,),
@@ -2774,6 +2793,13 @@ class World:
         """Angular velocities of all bodies, world axes, shape (n, 3), rad/s; otherwise as ``positions``."""
     @angular_velocities.setter
     def angular_velocities(self, value: ArrayLike) -> None: ...
+    def contact_force(self, a: _BodyOrLink, b: _BodyOrLink) -> _Floats:
+        """Returns the sum of the contact forces of ``a`` on ``b`` in the last sub-step, shape (3,), N, world axes, without impacts; zero if
+        they do not touch.
+
+        a, b: a body, an articulation or a link: a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link). A link is its own
+        shapes, without those of links fixed to it.
+        """
     @property
     def events(self) -> list[Event]:
         """The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
@@ -3037,8 +3063,10 @@ class World:
         """
     def rollout(
         self,
-        controls: ArrayLike,
+        controls: ArrayLike | None = None,
         *,
+        steps: int | None = None,
+        forks: int | None = None,
         articulations: Any = None,
         states: ArrayLike | None = None,
         every: int = 1,
@@ -3049,7 +3077,8 @@ class World:
 
         controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
         ``articulations`` one after the other (by default all of the world, in order; without any, n
-        is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+        is 0). Without controls generalized forces stay as they are: then steps is the number of steps, and forks that of
+        forks, by default as many as states, or 1. states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
         default the state of the world. every: interval in steps at which the state is kept.
         threads: largest number of threads (default: all cores). Returns the states, shape (forks,
         steps // every, len(state)): the same bits on any number of threads. A fork that fails
@@ -3477,6 +3506,39 @@ class World:
         change. Requires matplotlib, the extra ``plot``.
 
         ax: the axes to plot on, by default new ones. Returns the axes.
+        """
+    def animation(
+        self,
+        duration: float = 5.0,
+        *,
+        width: int = 480,
+        height: int = 320,
+        fps: float = 15.0,
+        speed: float = 1.0,
+        camera: Sequence[Any] | None = None,
+        control: Callable[[World], object] | None = None,
+    ) -> Animation:
+        """Steps a fork for ``duration`` seconds and returns an ``Animation`` of it for notebooks, which plays without a kernel and without
+        a network; ``save`` writes it. This world does not change.
+
+        width, height: pixels. fps: images per second. speed: times real time. camera: as in ``render``. control: a function that
+        is called with the fork before each step.
+        """
+    def video(
+        self,
+        path: _Path,
+        duration: float = 5.0,
+        *,
+        width: int = 1280,
+        height: int = 720,
+        fps: float = 30.0,
+        speed: float = 1.0,
+        camera: Sequence[Any] | None = None,
+        control: Callable[[World], object] | None = None,
+    ) -> None:
+        """Steps a fork for ``duration`` seconds and writes a video of it (``.mp4`` and all that ffmpeg knows), or without ffmpeg an animated
+        PNG (``.png``, ``.apng``). This world does not change. Arguments as in ``animation``. Without ffmpeg or a graphics adapter:
+        ``PictureError``.
         """
     def plot_paths(
         self, duration: float = 5.0, *, bodies: _Body | Iterable[_Body] | None = None, along: Axis = "y", ax: Any = None

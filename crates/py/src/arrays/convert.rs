@@ -109,6 +109,19 @@ pub fn vec3_or(value: Option<&Bound<'_, PyAny>>, what: &str, usual: Vec3) -> Res
     value.map_or(Ok(usual), |value| vec3(value, what))
 }
 
+/// Converts a direction: the letter of an axis, such as ``"x"`` or ``"-z"``, or three numbers of any length.
+pub fn direction(value: &Bound<'_, PyAny>, what: &str) -> Result<Vec3> {
+    let Ok(word) = value.extract::<String>() else { return vec3(value, what) };
+    tumble::scene::axis_by_name(&word).map(Vec3::from).ok_or_else(|| {
+        Error::value(format!("{what}: `{word}` is no axis; expected x, y, z, -x, -y, -z or three numbers"))
+    })
+}
+
+/// Converts a direction, or returns the default for None.
+pub fn direction_or(value: Option<&Bound<'_, PyAny>>, what: &str, usual: Vec3) -> Result<Vec3> {
+    value.map_or(Ok(usual), |value| direction(value, what))
+}
+
 /// Converts a unit quaternion `x, y, z, w`. A length within 1e-6 of 1 is normalized.
 pub fn rotation(value: &Bound<'_, PyAny>, what: &str) -> Result<Quat> {
     let [x, y, z, w] = some::<4>(value, what)?;

@@ -10,6 +10,7 @@ use crate::batch::member::{Member, Start, Task, write};
 use crate::batch::pickling::{self, Reduced};
 use crate::batch::policy::Policy;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::world::add::own_place;
 use crate::world::bulk::Bulk;
 use crate::world::class::World;
@@ -181,7 +182,7 @@ impl Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (world, n, *, threads=None, articulations=None, configure=None))]
+    #[pyo3(signature = (world, n, *, threads=None, articulations=None, configure=None, **unknown), text_signature = "(world, n, *, threads=None, articulations=None, configure=None)")]
     fn new(
         py: Python<'_>,
         world: &Bound<'_, World>,
@@ -189,7 +190,9 @@ impl Batch {
         #[pyo3(from_py_with = whole::threads)] threads: Option<usize>,
         articulations: Option<Vec<Bound<'_, PyAny>>>,
         configure: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Batch> {
+        keywords::check(unknown, "Batch")?;
         if n == 0 || n > MOST_WORLDS {
             return Err(Error::value(format!("n is {n}; it must be 1 to {MOST_WORLDS}")));
         }
@@ -235,7 +238,7 @@ impl Batch {
     /// A world that fails raises ``StepError`` with its number, after all others have stepped:
     /// ``failed`` says which. It stays as before the step that failed, and ``reset`` serves it as any
     /// other.
-    #[pyo3(signature = (controls=None, substeps=1, *, targets=None, policy=None, mask=None))]
+    #[pyo3(signature = (controls=None, substeps=1, *, targets=None, policy=None, mask=None, **unknown), text_signature = "($self, controls=None, substeps=1, *, targets=None, policy=None, mask=None)")]
     fn step(
         &self,
         py: Python<'_>,
@@ -244,7 +247,9 @@ impl Batch {
         targets: Option<&Bound<'_, PyAny>>,
         policy: Option<&Bound<'_, Policy>>,
         mask: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Batch.step")?;
         let policy = policy.map(Bound::get);
         if controls.is_some() && policy.is_some() {
             return Err(Error::value("controls and policy: give one of them"));
@@ -274,7 +279,7 @@ impl Batch {
     ///
     /// A row that is no state raises ``InvalidValueError`` with the number of its world, which is at its
     /// start then.
-    #[pyo3(signature = (mask=None, state=None, *, q=None, v=None))]
+    #[pyo3(signature = (mask=None, state=None, *, q=None, v=None, **unknown), text_signature = "($self, mask=None, state=None, *, q=None, v=None)")]
     fn reset(
         &self,
         py: Python<'_>,
@@ -282,7 +287,9 @@ impl Batch {
         state: Option<&Bound<'_, PyAny>>,
         q: Option<&Bound<'_, PyAny>>,
         v: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Batch.reset")?;
         let selected = self.selected(mask)?;
         let state = self.rows("state", state, self.layout.state)?;
         let (q, v) = (self.rows("q", q, self.layout.positions())?, self.rows("v", v, self.layout.dof())?);
@@ -298,7 +305,7 @@ impl Batch {
     /// Arguments as in ``Articulation.set_drive``: one number for all joints, shape (dof,) or (n, dof). A
     /// spherical joint has three columns, and a floating root six, which must be 0. Drives and their
     /// targets are no part of the state, so ``reset`` leaves them.
-    #[pyo3(signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None))]
+    #[pyo3(signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=None, damping=None, max_force=None)")]
     fn set_drives(
         &self,
         py: Python<'_>,
@@ -307,7 +314,9 @@ impl Batch {
         stiffness: Option<&Bound<'_, PyAny>>,
         damping: Option<&Bound<'_, PyAny>>,
         max_force: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Batch.set_drives")?;
         let setting = |name, given| Setting::new(name, given, self.shared.len(), self.layout.dof());
         let drives = Drives {
             target: setting("target", target)?,
@@ -330,7 +339,7 @@ impl Batch {
     /// of the state, so ``reset`` leaves them.
     ///
     /// A number out of range raises ``InvalidValueError`` with the number of the world; worlds before it have their new ones.
-    #[pyo3(signature = (name, *, mass=None, friction=None, restitution=None))]
+    #[pyo3(signature = (name, *, mass=None, friction=None, restitution=None, **unknown), text_signature = "($self, name, *, mass=None, friction=None, restitution=None)")]
     fn set_body(
         &self,
         py: Python<'_>,
@@ -338,7 +347,9 @@ impl Batch {
         mass: Option<&Bound<'_, PyAny>>,
         friction: Option<&Bound<'_, PyAny>>,
         restitution: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Batch.set_body")?;
         let count = self.shared.len();
         let constants = Constants::new(count, mass, friction, restitution)?;
         self.shared

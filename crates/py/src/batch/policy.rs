@@ -10,6 +10,7 @@
 use crate::arrays::convert::{Numbers, array, numbers, shown};
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -129,8 +130,13 @@ impl Layer {
 #[pymethods]
 impl Policy {
     #[new]
-    #[pyo3(signature = (layers, *, activation="tanh"))]
-    fn new(layers: Vec<(Bound<'_, PyAny>, Option<Bound<'_, PyAny>>)>, activation: &str) -> Result<Policy> {
+    #[pyo3(signature = (layers, *, activation="tanh", **unknown), text_signature = "(layers, *, activation='tanh')")]
+    fn new(
+        layers: Vec<(Bound<'_, PyAny>, Option<Bound<'_, PyAny>>)>,
+        activation: &str,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Policy> {
+        keywords::check(unknown, "Policy")?;
         let activation = match activation {
             "tanh" => Activation::Tanh,
             "relu" => Activation::Relu,

@@ -42,7 +42,7 @@ fn helm(mut of: Helm, given: &Bound<'_, PyDict>) -> Result<Helm> {
     }
     for (name, vector) in [("up", &mut of.up), ("wind", &mut of.wind)] {
         if let Some(value) = given.get_item(name)? {
-            *vector = Vec3::from(some::<3>(&value, name)?);
+            *vector = crate::arrays::convert::direction(&value, name)?;
             given.del_item(name)?;
         }
     }

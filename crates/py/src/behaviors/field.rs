@@ -2,10 +2,11 @@
 
 #![allow(clippy::approx_constant, reason = "defaults that Python shows as numbers")]
 
-use crate::arrays::convert::{vec3, vec3_or};
+use crate::arrays::convert::{direction_or, vec3, vec3_or};
 use crate::arrays::whole;
 use crate::behaviors;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::world::add::own_place;
 use crate::world::shared::Shared;
 use pyo3::prelude::*;
@@ -44,7 +45,7 @@ pub struct Panel {
 #[pymethods]
 impl Panel {
     #[new]
-    #[pyo3(signature = (body, area, *, part=0, point=None, normal=None, lift_slope=6.283185307179586, drag=0.02))]
+    #[pyo3(signature = (body, area, *, part=0, point=None, normal=None, lift_slope=6.283185307179586, drag=0.02, **unknown), text_signature = "(body, area, *, part=0, point=None, normal=None, lift_slope=6.283185307179586, drag=0.02)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         body: Py<PyAny>,
@@ -54,8 +55,10 @@ impl Panel {
         normal: Option<&Bound<'_, PyAny>>,
         lift_slope: f64,
         drag: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Panel> {
-        let (point, normal) = (vec3_or(point, "point", Vec3::zeros())?, vec3_or(normal, "normal", Vec3::z())?);
+        keywords::check(unknown, "Panel")?;
+        let (point, normal) = (vec3_or(point, "point", Vec3::zeros())?, direction_or(normal, "normal", Vec3::z())?);
         Ok(Panel { body, part, point, normal, flat: [area, lift_slope, drag] })
     }
 
@@ -70,8 +73,15 @@ impl Field {
     /// proportion to the square of the speed and to the silhouette, with the density of the air, kg/m³, and a
     /// drag coefficient.
     #[staticmethod]
-    #[pyo3(signature = (velocity, *, drag=None, density=1.2, drag_coefficient=0.47))]
-    fn wind(velocity: &Bound<'_, PyAny>, drag: Option<f64>, density: f64, drag_coefficient: f64) -> Result<Field> {
+    #[pyo3(signature = (velocity, *, drag=None, density=1.2, drag_coefficient=0.47, **unknown), text_signature = "(velocity, *, drag=None, density=1.2, drag_coefficient=0.47)")]
+    fn wind(
+        velocity: &Bound<'_, PyAny>,
+        drag: Option<f64>,
+        density: f64,
+        drag_coefficient: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Field> {
+        keywords::check(unknown, "Field.wind")?;
         let velocity = vec3(velocity, "velocity")?;
         let law = match drag {
             Some(coefficient) => DragLaw::Linear { coefficient },
@@ -84,8 +94,14 @@ impl Field {
     /// A point that attracts masses as a planet does. position: shape (3,), m. strength: m³/s², negative to repel.
     /// softening: length, m, below which the force does not grow.
     #[staticmethod]
-    #[pyo3(signature = (position, strength, *, softening=0.0))]
-    fn attractor(position: &Bound<'_, PyAny>, strength: f64, softening: f64) -> Result<Field> {
+    #[pyo3(signature = (position, strength, *, softening=0.0, **unknown), text_signature = "(position, strength, *, softening=0.0)")]
+    fn attractor(
+        position: &Bound<'_, PyAny>,
+        strength: f64,
+        softening: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Field> {
+        keywords::check(unknown, "Field.attractor")?;
         let position = vec3(position, "position")?;
         Attractor::new("", position, strength, softening)?;
         Ok(Field { law: Law::Attractor { position, strength, softening } })
@@ -94,8 +110,15 @@ impl Field {
     /// An explosion. position: shape (3,), m. impulse: momentum in all directions together, N·s; a body gets the
     /// share that its silhouette covers. start: s. decay: time constant, s.
     #[staticmethod]
-    #[pyo3(signature = (position, impulse, *, start=0.0, decay=0.02))]
-    fn explosion(position: &Bound<'_, PyAny>, impulse: f64, start: f64, decay: f64) -> Result<Field> {
+    #[pyo3(signature = (position, impulse, *, start=0.0, decay=0.02, **unknown), text_signature = "(position, impulse, *, start=0.0, decay=0.02)")]
+    fn explosion(
+        position: &Bound<'_, PyAny>,
+        impulse: f64,
+        start: f64,
+        decay: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Field> {
+        keywords::check(unknown, "Field.explosion")?;
         let position = vec3(position, "position")?;
         Explosion::new("", position, impulse, start, decay)?;
         Ok(Field { law: Law::Explosion { position, impulse, start, decay } })
@@ -104,13 +127,15 @@ impl Field {
     /// A fluid below a horizontal surface. surface: a point of it, shape (3,), m. density: kg/m³. drag: per mass of
     /// displaced fluid, 1/s. current: velocity of the fluid, shape (3,), m/s.
     #[staticmethod]
-    #[pyo3(signature = (surface=None, density=1000.0, *, drag=0.0, current=None))]
+    #[pyo3(signature = (surface=None, density=1000.0, *, drag=0.0, current=None, **unknown), text_signature = "(surface=None, density=1000.0, *, drag=0.0, current=None)")]
     fn buoyancy(
         surface: Option<&Bound<'_, PyAny>>,
         density: f64,
         drag: f64,
         current: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Field> {
+        keywords::check(unknown, "Field.buoyancy")?;
         let surface = vec3_or(surface, "surface", Vec3::zeros())?;
         let current = vec3_or(current, "current", Vec3::zeros())?;
         Buoyancy::new("", surface, density)?.with_drag(drag, current)?;
@@ -119,8 +144,14 @@ impl Field {
 
     /// Lift and drag on panels: wings, sails, fins. density: of the air, kg/m³. wind: its velocity, shape (3,), m/s.
     #[staticmethod]
-    #[pyo3(signature = (panels, *, density=1.2, wind=None))]
-    fn panels(panels: Vec<Py<Panel>>, density: f64, wind: Option<&Bound<'_, PyAny>>) -> Result<Field> {
+    #[pyo3(signature = (panels, *, density=1.2, wind=None, **unknown), text_signature = "(panels, *, density=1.2, wind=None)")]
+    fn panels(
+        panels: Vec<Py<Panel>>,
+        density: f64,
+        wind: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Field> {
+        keywords::check(unknown, "Field.panels")?;
         let wind = vec3_or(wind, "wind", Vec3::zeros())?;
         Panels::new("", density, wind, [])?;
         Ok(Field { law: Law::Panels { density, wind, panels } })

@@ -3,6 +3,7 @@
 use crate::arrays::convert::{quaternion, some, vec3_or, vector};
 use crate::behaviors::{appearance, placed};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::gc::Anchor;
@@ -118,7 +119,7 @@ impl PyFlock {
     /// Adds a boid, also in flight, and returns its handle. name: unique; by default the world makes one. position: m,
     /// velocity: m/s, shape (3,). mass: kg. radius: of the sphere with which it collides, m. bank_time: seconds of its
     /// rate of turn that are a quarter turn of bank; roll_time: time constant of the roll, s. color: sRGB, each 0 to 1.
-    #[pyo3(signature = (name="", position=None, velocity=None, *, mass=1.0, radius=0.2, bank_time=1.0, roll_time=0.2, color=None))]
+    #[pyo3(signature = (name="", position=None, velocity=None, *, mass=1.0, radius=0.2, bank_time=1.0, roll_time=0.2, color=None, **unknown), text_signature = "($self, name='', position=None, velocity=None, *, mass=1.0, radius=0.2, bank_time=1.0, roll_time=0.2, color=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add(
         &self,
@@ -131,7 +132,9 @@ impl PyFlock {
         bank_time: f64,
         roll_time: f64,
         color: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyBoid> {
+        keywords::check(unknown, "Flock.add")?;
         let boid = Boid::new(Shape::sphere(radius)?, mass)?
             .with_name(name)
             .with_position(vec3_or(position, "position", Vec3::zeros())?)

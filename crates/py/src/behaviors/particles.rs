@@ -6,6 +6,7 @@ use crate::arrays::convert::{pose, vec3, vec3_or};
 use crate::arrays::whole;
 use crate::behaviors::{appearance, material, placed, rows};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::add::own_place;
@@ -35,7 +36,7 @@ pub struct Emitter {
 #[pymethods]
 impl Emitter {
     #[new]
-    #[pyo3(signature = (position=None, *, orientation=None, body=None, part=0, radius=0.0, speed=None, half_angle=3.141592653589793, lifetime=None, burst=0, rate=0.0, start=0.0, end=None))]
+    #[pyo3(signature = (position=None, *, orientation=None, body=None, part=0, radius=0.0, speed=None, half_angle=3.141592653589793, lifetime=None, burst=0, rate=0.0, start=0.0, end=None, **unknown), text_signature = "(position=None, *, orientation=None, body=None, part=0, radius=0.0, speed=None, half_angle=3.141592653589793, lifetime=None, burst=0, rate=0.0, start=0.0, end=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         position: Option<&Bound<'_, PyAny>>,
@@ -50,7 +51,9 @@ impl Emitter {
         rate: f64,
         start: f64,
         end: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Emitter> {
+        keywords::check(unknown, "Emitter")?;
         let source = Source {
             pose: pose(position, orientation)?,
             mount: None,

@@ -8,6 +8,7 @@ use crate::behaviors::particles::{self, Emitter, Given, Particles};
 use crate::behaviors::placed;
 use crate::behaviors::soft::{self, Common, Grid, Soft};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::world::class::World;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -26,7 +27,7 @@ impl World {
     /// ``"y_max"``), ``"corners"``, and numbers. implicitness: time in a step at which the springs act, 0.5 to 1; 1
     /// damps what a step does not resolve. friction, restitution: of the nodes. color: sRGB, each 0 to 1.
     #[pyo3(signature = (name="", *, nodes=None, size=None, mass=0.2, stiffness=None, damping=0.01, position=None, orientation=None, velocity=None,
-        node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None))]
+        node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None, **unknown), text_signature = "($self, name='', *, nodes=None, size=None, mass=0.2, stiffness=None, damping=0.01, position=None, orientation=None, velocity=None, node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_cloth(
         &self,
@@ -46,7 +47,9 @@ impl World {
         friction: f64,
         restitution: f64,
         color: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Soft> {
+        keywords::check(unknown, "World.add_cloth")?;
         let usual = Cloth::default();
         let grid = Grid::Cloth(Cloth {
             nodes: nodes.unwrap_or(usual.nodes),
@@ -65,7 +68,7 @@ impl World {
     /// nodes, size: along x, y and z. pins: names of sides, ``"x_min"`` to ``"z_max"``, ``"corners"``, and numbers of
     /// nodes. The other arguments are those of ``add_cloth``.
     #[pyo3(signature = (name="", *, nodes=None, size=None, mass=2.0, stiffness=None, damping=0.01, position=None, orientation=None, velocity=None,
-        node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None))]
+        node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None, **unknown), text_signature = "($self, name='', *, nodes=None, size=None, mass=2.0, stiffness=None, damping=0.01, position=None, orientation=None, velocity=None, node_radius=None, pins=None, implicitness=1.0, friction=0.5, restitution=0.0, color=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_jelly(
         &self,
@@ -85,7 +88,9 @@ impl World {
         friction: f64,
         restitution: f64,
         color: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Soft> {
+        keywords::check(unknown, "World.add_jelly")?;
         let usual = Jelly::default();
         let grid = Grid::Jelly(Jelly {
             nodes: nodes.unwrap_or(usual.nodes),
@@ -112,7 +117,7 @@ impl World {
     /// glow: colors as they are, without light, for sparks and flames.
     #[pyo3(signature = (name="", emitters=vec![], *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0,
         linear_drag=0.0, quadratic_drag=0.0, wind=None, collidable=true, group=0, mask=None, two_way=false, color=None, drawn_radius=None, fade=0.0,
-        opacity=None, scale=None, end_color=None, glow=false),
+        opacity=None, scale=None, end_color=None, glow=false, **unknown),
         text_signature = "(self, name='', emitters=(), *, capacity=10000, seed=0, mass=0.001, radius=0.01, friction=0.5, restitution=0.0, gravity_scale=1.0, \
         linear_drag=0.0, quadratic_drag=0.0, wind=None, collidable=True, group=0, mask=None, two_way=False, color=None, drawn_radius=None, fade=0.0, \
         opacity=None, scale=None, end_color=None, glow=False)")]
@@ -143,7 +148,9 @@ impl World {
         scale: Option<&Bound<'py, PyAny>>,
         end_color: Option<&Bound<'py, PyAny>>,
         glow: bool,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Particles> {
+        keywords::check(unknown, "World.add_particles")?;
         let settings = ParticleSettings {
             capacity,
             seed,
@@ -197,14 +204,16 @@ impl World {
     ///
     /// targets: the bodies, cloths, jellies and boids that it acts on, as handles or names; None for all that move,
     /// also those that are added later.
-    #[pyo3(signature = (name, field, *, targets=None))]
+    #[pyo3(signature = (name, field, *, targets=None, **unknown), text_signature = "($self, name, field, *, targets=None)")]
     fn add_field(
         &self,
         py: Python<'_>,
         name: &str,
         field: &Bound<'_, Field>,
         targets: Option<Vec<Bound<'_, PyAny>>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "World.add_field")?;
         if name.is_empty() {
             return Err(Error::value("name: a field needs one, to be removed by"));
         }

@@ -3,6 +3,7 @@
 use crate::arrays::convert::path;
 use crate::arrays::whole;
 use crate::errors::{Error, Result, caught};
+use crate::keywords::{self, Unknown};
 use crate::world::class::World;
 use crate::world::inner::Inner;
 use crate::world::shared::Shared;
@@ -94,8 +95,9 @@ impl Recorder {
     /// path: of the file. An existing file is replaced; its folder must exist. cameras: whether frames have the images of all
     /// cameras, which make it large.
     #[new]
-    #[pyo3(signature = (path, *, cameras=false))]
-    fn new(path: &Bound<'_, PyAny>, cameras: bool) -> Result<Recorder> {
+    #[pyo3(signature = (path, *, cameras=false, **unknown), text_signature = "(path, *, cameras=False)")]
+    fn new(path: &Bound<'_, PyAny>, cameras: bool, unknown: Option<Unknown<'_, '_>>) -> Result<Recorder> {
+        keywords::check(unknown, "Recorder")?;
         let path = self::path(path)?;
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
@@ -115,14 +117,16 @@ impl Recorder {
 
     /// Steps the world ``n`` times and adds a frame after every ``every`` steps. If nothing is
     /// recorded yet, a frame is also added before the first step.
-    #[pyo3(signature = (world, n, *, every=1))]
+    #[pyo3(signature = (world, n, *, every=1, **unknown), text_signature = "($self, world, n, *, every=1)")]
     fn run(
         &self,
         py: Python<'_>,
         world: &Bound<'_, World>,
         #[pyo3(from_py_with = whole::n)] n: u32,
         #[pyo3(from_py_with = whole::every)] every: u32,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Recorder.run")?;
         if every == 0 {
             return Err(Error::value("every is 0; it must be at least 1"));
         }

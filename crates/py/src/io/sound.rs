@@ -3,6 +3,7 @@
 use crate::arrays::convert::some;
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::world::class::World;
 use crate::world::gc::{Anchor, anchor};
 use crate::world::shared::Shared;
@@ -66,14 +67,16 @@ impl Soundtrack {
     /// the scene, or ``(0, -3, 1.7)`` and the origin. materials: names of bodies, and how each sounds: ``"wood"``, ``"rubber"``,
     /// ``"plastic"``, ``"glass"``, ``"stone"`` or ``"steel"``; by default the scene or the density of a body says it.
     #[new]
-    #[pyo3(signature = (world, *, eye=None, target=None, materials=None))]
+    #[pyo3(signature = (world, *, eye=None, target=None, materials=None, **unknown), text_signature = "(world, *, eye=None, target=None, materials=None)")]
     fn new(
         py: Python<'_>,
         world: &Bound<'_, World>,
         eye: Option<&Bound<'_, PyAny>>,
         target: Option<&Bound<'_, PyAny>>,
         materials: Option<BTreeMap<String, String>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Soundtrack> {
+        keywords::check(unknown, "Soundtrack")?;
         let shared = world.get().shared.clone();
         let (scene, time) = shared.read(|inner| Ok((inner.scene.clone(), inner.world.time())))?;
         let listener = match (eye, target) {
@@ -132,8 +135,15 @@ impl Soundtrack {
 
     /// Writes a WAV file of 16 bits, whose name ends in ``.wav``, and returns the factor of its samples. gain_db: gain, -120 to 120 dB; by
     /// default the peak is brought to -3 dB of full scale. A peak above 0.98 of full scale is lowered to it by one factor for the whole.
-    #[pyo3(signature = (path, *, gain_db=None))]
-    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>, gain_db: Option<f64>) -> Result<f64> {
+    #[pyo3(signature = (path, *, gain_db=None, **unknown), text_signature = "($self, path, *, gain_db=None)")]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        gain_db: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<f64> {
+        keywords::check(unknown, "Soundtrack.save")?;
         let path = crate::arrays::convert::path(path)?;
         if path.extension().is_some_and(|ending| !ending.eq_ignore_ascii_case("wav")) {
             let file = path.display();

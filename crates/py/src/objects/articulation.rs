@@ -4,6 +4,8 @@
 use crate::arrays::convert::{array, vec3, vector};
 use crate::choices::{COLLISION_MESHES, MISSING_MESHES, meaning, word};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
+use crate::objects::all_drives::AllDrives;
 use crate::objects::binding::{Binding, Now, Source, Which, locked, start};
 use crate::objects::description::alone;
 use crate::objects::joints::{component, drive, result};
@@ -98,7 +100,7 @@ impl Articulation {
     /// collision meshes. collision_meshes: ``"exact"`` or ``"hull"``. velocity_limits: whether the largest
     /// velocities of joints are enforced, as ``max_velocity``, against any force; False: they are read and have no effect.
     #[staticmethod]
-    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact", velocity_limits=false))]
+    #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact", velocity_limits=false, **unknown), text_signature = "(path, *, floating=False, packages=None, missing_meshes='error', collision_meshes='exact', velocity_limits=False)")]
     pub fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
@@ -107,7 +109,9 @@ impl Articulation {
         missing_meshes: &str,
         collision_meshes: &str,
         velocity_limits: bool,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Articulation> {
+        keywords::check(unknown, "Articulation.from_urdf")?;
         let file = crate::arrays::convert::path(path)?;
         let options = UrdfOptions {
             velocity_limits,
@@ -129,14 +133,16 @@ impl Articulation {
     /// keyframe: name or number of the keyframe that it starts in. missing_meshes: ``"error"`` or
     /// ``"skip"``, for missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
     #[staticmethod]
-    #[pyo3(signature = (path, *, keyframe=None, missing_meshes="error", collision_meshes="hull"))]
+    #[pyo3(signature = (path, *, keyframe=None, missing_meshes="error", collision_meshes="hull", **unknown), text_signature = "(path, *, keyframe=None, missing_meshes='error', collision_meshes='hull')")]
     pub fn from_mjcf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         keyframe: Option<String>,
         missing_meshes: &str,
         collision_meshes: &str,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Articulation> {
+        keywords::check(unknown, "Articulation.from_mjcf")?;
         let file = crate::arrays::convert::path(path)?;
         let options = MjcfOptions {
             keyframe,
@@ -153,14 +159,16 @@ impl Articulation {
     /// packages: folders by name, for ``model://NAME/…``. missing_meshes: ``"error"`` or ``"skip"``, for
     /// missing collision meshes. collision_meshes: ``"exact"`` or ``"hull"``.
     #[staticmethod]
-    #[pyo3(signature = (path, *, packages=None, missing_meshes="error", collision_meshes="exact"))]
+    #[pyo3(signature = (path, *, packages=None, missing_meshes="error", collision_meshes="exact", **unknown), text_signature = "(path, *, packages=None, missing_meshes='error', collision_meshes='exact')")]
     pub fn from_sdformat(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         packages: Option<BTreeMap<String, PathBuf>>,
         missing_meshes: &str,
         collision_meshes: &str,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Articulation> {
+        keywords::check(unknown, "Articulation.from_sdformat")?;
         let file = crate::arrays::convert::path(path)?;
         let options = UrdfOptions {
             packages: packages.unwrap_or_default(),
@@ -409,7 +417,7 @@ impl Articulation {
     /// With ``stiffness`` or ``damping`` it drives to position ``target`` (rad or m) and
     /// ``velocity``. With neither it holds ``velocity``. Without arguments the drive is removed.
     /// max_force: largest torque or force, N·m or N; None: the ``effort`` of the joint. ``save`` includes it.
-    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
+    #[pyo3(signature = (joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None, **unknown), text_signature = "($self, joint, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
         &self,
@@ -420,7 +428,9 @@ impl Articulation {
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Articulation.set_drive")?;
         let (place, (first, count)) = (self.in_world()?, self.dofs_of(joint)?);
         let each = |name: &str, value: Option<&Bound<'_, PyAny>>| match value {
             Some(value) => (0..count).map(|k| component(name, value, k, count).map(Some)).collect::<Result<Vec<_>>>(),
@@ -436,6 +446,45 @@ impl Articulation {
                 let drive = drive(targets[k], velocities[k], stiffness, damping, most)?;
                 body.set_dof(first + k, DofSettings { drive, ..before })?;
             }
+            *inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())? = body;
+            Ok(())
+        })
+    }
+
+    /// Sets the drives of all degrees of freedom of a body in a world at once, in the order of ``qd``.
+    ///
+    /// Arguments as in ``set_drive``: a number for all that can have a drive, or shape (dof,). Degrees of freedom whose numbers are
+    /// all 0 or None have no drive then. A ``target`` without
+    /// ``stiffness`` and ``damping`` is that of the drives that are there, which keep their gains. ``save`` includes them.
+    #[pyo3(
+        signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None, **unknown),
+        text_signature = "($self, *, target=None, velocity=None, stiffness=None, damping=None, max_force=None)"
+    )]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+    fn set_drives(
+        &self,
+        py: Python<'_>,
+        target: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        stiffness: Option<&Bound<'_, PyAny>>,
+        damping: Option<&Bound<'_, PyAny>>,
+        max_force: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "Articulation.set_drives")?;
+        let place = self.in_world()?;
+        let each = |name, value: Option<&Bound<'_, PyAny>>| value.map(|v| self.of_each_dof((name, v))).transpose();
+        let given = AllDrives {
+            target: each("target", target)?,
+            velocity: each("velocity", velocity)?,
+            stiffness: each("stiffness", stiffness)?,
+            damping: each("damping", damping)?,
+            max_force: each("max_force", max_force)?,
+        };
+        place.write(py, |inner| {
+            let body = inner.world.get::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())?;
+            let mut body = body.clone();
+            body.set_drives(&given.drives(&body)?)?;
             *inner.world.get_mut::<ArticulatedBody>(place.id).ok_or_else(|| place.removed())? = body;
             Ok(())
         })

@@ -452,7 +452,7 @@ impl RigidBody {
 
     #[setter]
     fn set_one_way(&self, py: Python<'_>, value: Option<&Bound<'_, PyAny>>) -> Result<()> {
-        let direction = value.map(|value| vec3(value, "one_way")).transpose()?;
+        let direction = value.map(|value| crate::arrays::convert::direction(value, "one_way")).transpose()?;
         self.change(py, |body| body.one_way = direction)
     }
 

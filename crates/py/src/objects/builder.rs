@@ -1,9 +1,10 @@
 //! Makes descriptions of articulated bodies link by link.
 
-use crate::arrays::convert::{Numbers, numbers, pose, shown, vec3, vec3_or};
+use crate::arrays::convert::{Numbers, direction, direction_or, numbers, pose, shown, vec3, vec3_or};
 use crate::arrays::whole;
 use crate::choices::{JOINT_TYPES, JointType, meaning};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::appearance::{self, palette};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::link_inertia;
@@ -59,16 +60,20 @@ impl ArticulationBuilder {
 #[pymethods]
 impl ArticulationBuilder {
     #[new]
-    #[pyo3(signature = (name="articulation", *, self_collision=true))]
-    fn new(name: &str, self_collision: bool) -> ArticulationBuilder {
-        ArticulationBuilder { builder: Mutex::new(Builder::new(name).with_self_collision(self_collision)) }
+    #[pyo3(
+        signature = (name="articulation", *, self_collision=true, **unknown),
+        text_signature = "(name='articulation', *, self_collision=True)"
+    )]
+    fn new(name: &str, self_collision: bool, unknown: Option<Unknown<'_, '_>>) -> Result<ArticulationBuilder> {
+        keywords::check(unknown, "ArticulationBuilder")?;
+        Ok(ArticulationBuilder { builder: Mutex::new(Builder::new(name).with_self_collision(self_collision)) })
     }
 
     /// Adds a link. Its joint has the same name.
     ///
     /// parent: a link that was added before; None: the base. joint: ``"revolute"``, ``"prismatic"``,
     /// ``"spherical"``, ``"fixed"``, or ``"floating"`` without a parent. axis: of a revolute or
-    /// prismatic joint, shape (3,), any length above 0. position, orientation: the frame of the joint
+    /// prismatic joint, shape (3,), any length above 0, or ``"x"``, ``"-z"`` and so on. position, orientation: the frame of the joint
     /// in the frame of the parent, shape (3,), m, and (4,); with the joint at zero it is the frame of
     /// the link.
     ///
@@ -142,7 +147,7 @@ impl ArticulationBuilder {
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
         }
-        let axis = vec3_or(axis, "axis", Vec3::z())?;
+        let axis = direction_or(axis, "axis", Vec3::z())?;
         if axis == Vec3::zeros() {
             return Err(Error::value("axis is [0, 0, 0]; expected a direction, any length above 0"));
         }
@@ -153,7 +158,7 @@ impl ArticulationBuilder {
             JointType::Fixed => Joint::Fixed,
             JointType::Floating => Joint::Floating,
         };
-        let surface = Given::of_words("add_link", surface)?;
+        let surface = Given::of_words("ArticulationBuilder.add_link", surface)?;
         let mut link = LinkBuilder::new(name, joint)
             .with_pose(pose(position, orientation)?)
             .with_joint_damping(joint_damping)
@@ -241,8 +246,8 @@ impl ArticulationBuilder {
         if mass.is_some() && density.is_some() {
             return Err(Error::value(format!("shape of link '{link}': expected a mass or a density, not both")));
         }
-        let surface = Given::of_words("add_shape", surface)?;
-        let one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
+        let surface = Given::of_words("ArticulationBuilder.add_shape", surface)?;
+        let one_way = one_way.map(|given| direction(given, "one_way")).transpose()?;
         let mode = contacts.map(|contacts| meaning("contacts", contacts, ContactMode::NAMES)).transpose()?;
         let (group, mask) =
             (group.map(query::group).transpose()?, mask.map(|mask| query::mask(Some(mask))).transpose()?);

@@ -64,7 +64,7 @@ pub fn _unpickle_articulation(
     let file = file.into_pyobject(py)?.into_any();
     let [missing, collision] = words;
     let description =
-        Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision, velocity_limits)?;
+        Articulation::from_urdf(py, &file, floating, Some(packages), &missing, &collision, velocity_limits, None)?;
     with_numbers(py, description, numbers)
 }
 
@@ -105,9 +105,9 @@ pub fn described<'py>(value: &Bound<'py, PyAny>) -> Result<Bound<'py, Articulati
     }
     let py = value.py();
     let read = match FileKind::of(&path(value)?) {
-        Ok(FileKind::Mjcf) => Articulation::from_mjcf(py, value, None, "error", "hull")?,
-        Ok(FileKind::Sdformat) => Articulation::from_sdformat(py, value, None, "error", "exact")?,
-        _ => Articulation::from_urdf(py, value, false, None, "error", "exact", false)?,
+        Ok(FileKind::Mjcf) => Articulation::from_mjcf(py, value, None, "error", "hull", None)?,
+        Ok(FileKind::Sdformat) => Articulation::from_sdformat(py, value, None, "error", "exact", None)?,
+        _ => Articulation::from_urdf(py, value, false, None, "error", "exact", false, None)?,
     };
     Ok(Bound::new(py, read)?)
 }

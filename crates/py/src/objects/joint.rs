@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{Numbers, numbers, shown, vector};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::bodies::handle;
 use crate::objects::builder::pair;
 use crate::objects::dof_settings::{DofSpot, dof_properties};
@@ -247,7 +248,7 @@ impl Joint {
     /// Sets its drive; the arguments are those of ``Articulation.set_drive``. A drive to an angle goes
     /// the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
     /// a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
-    #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
+    #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None)")]
     fn set_drive(
         &self,
         py: Python<'_>,
@@ -256,7 +257,9 @@ impl Joint {
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Joint.set_drive")?;
         let target = target.map(|value| numbers(value, "target")).transpose()?;
         let velocity = velocity.map(|value| numbers(value, "velocity")).transpose()?;
         self.change(py, |joint| {

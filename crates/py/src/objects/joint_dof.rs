@@ -1,6 +1,7 @@
 //! One degree of freedom of a loop joint: a handle that reads from the world at each use.
 
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::builder::pair;
 use crate::objects::dof_settings::{DofSpot, dof_properties};
 use crate::objects::joints::{drive, drive_of};
@@ -56,7 +57,7 @@ impl JointDof {
     }
 
     /// Sets its drive; the arguments are those of ``Joint.set_drive``.
-    #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None))]
+    #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None)")]
     fn set_drive(
         &self,
         py: Python<'_>,
@@ -65,7 +66,9 @@ impl JointDof {
         stiffness: f64,
         damping: f64,
         max_force: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "JointDof.set_drive")?;
         self.spot().set(py, |dof| {
             dof.drive = drive(target, velocity, stiffness, damping, max_force.unwrap_or(dof.effort))?;
             Ok(())

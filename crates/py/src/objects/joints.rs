@@ -76,7 +76,7 @@ impl Articulation {
     /// Converts a number for all degrees of freedom, or one for each.
     pub(super) fn of_each_dof(&self, (name, value): (&str, &Bound<'_, PyAny>)) -> Result<Vec<f64>> {
         let dof = self.robot.dof();
-        let may_be_infinite = ["effort", "max_velocity"].contains(&name);
+        let may_be_infinite = ["effort", "max_velocity", "max_force"].contains(&name);
         let Numbers { shape, data } = if may_be_infinite { bounds(value, name) } else { numbers(value, name) }?;
         match shape.as_slice() {
             [] => Ok(vec![data[0]; dof]),

@@ -1,5 +1,6 @@
 //! Python classes of bodies, shapes and sphere trees.
 
+pub mod all_drives;
 pub mod appearance;
 pub mod articulation;
 pub mod articulation_status;

@@ -1,6 +1,6 @@
 //! Cameras and lights that bodies and links carry.
 
-use crate::arrays::convert::{array, some, vec3_or, vector};
+use crate::arrays::convert::{array, direction_or, some, vec3_or, vector};
 use crate::errors::{Error, Result};
 use crate::objects::body::RigidBody;
 use crate::objects::link::Link;
@@ -21,8 +21,8 @@ pub fn camera(
     [near, far]: [f64; 2],
 ) -> Result<CameraMount> {
     let position = vec3_or(position, "position", Vec3::zeros())?;
-    let ahead = vec3_or(directions[0], "forward", Vec3::x())?;
-    let up = vec3_or(directions[1], "up", Vec3::z())?;
+    let ahead = direction_or(directions[0], "forward", Vec3::x())?;
+    let up = direction_or(directions[1], "up", Vec3::z())?;
     let wrong = "forward and up: expected two directions, any length above 0, that are not parallel";
     let pose = facing(position.into(), ahead.into(), up.into()).ok_or_else(|| Error::value(wrong.to_owned()))?;
     if !(FOV[0]..=FOV[1]).contains(&fov_deg) {
@@ -61,7 +61,7 @@ pub fn light(
         }
         _ => {}
     }
-    let ahead = vec3_or(places[1], "direction", Vec3::x())?;
+    let ahead = direction_or(places[1], "direction", Vec3::x())?;
     let up = if ahead.normalize().z.abs() > 0.9 { Vec3::x() } else { Vec3::z() };
     let pose: Pose = facing(position.into(), ahead.into(), up.into())
         .ok_or_else(|| Error::value("direction: expected any length above 0".to_owned()))?;
@@ -169,7 +169,7 @@ macro_rules! attachments {
             /// Attaches a camera, at most one, that moves with the body or link and that scenes keep. position: shape (3,), m; forward,
             /// up: directions, shape (3,), not parallel; all in the frame of the shape of a body, or of the link. fov_deg: vertical
             /// field of view, degrees, 1 to 170. near, far: depths between which it sees, m.
-            #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0))]
+            #[pyo3(signature = (position=None, forward=None, up=None, *, fov_deg=40.0, near=0.05, far=500.0, **unknown))]
             #[pyo3(
                 text_signature = "($self, position=(0.0, 0.0, 0.0), forward=(1.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), *, fov_deg=40.0, near=0.05, far=500.0)"
             )]
@@ -183,7 +183,9 @@ macro_rules! attachments {
                 fov_deg: f64,
                 near: f64,
                 far: f64,
+                unknown: Option<crate::keywords::Unknown<'_, '_>>,
             ) -> Result<()> {
+                crate::keywords::check(unknown, concat!(stringify!($class), ".attach_camera"))?;
                 let camera = camera(position, [forward, up], fov_deg, [near, far])?;
                 if self.carried()?.0.is_some() {
                     return Err(self.full("camera"));
@@ -195,7 +197,10 @@ macro_rules! attachments {
             /// ``"directional"``, along direction, shape (3,); both in the frame of the shape of a body, or of the link. color: sRGB,
             /// shape (3,). intensity: at least 0; a directional light of 1 makes a white wall that faces it white, a point light at
             /// 1 m. casts_shadow: by default of directional lights.
-            #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None))]
+            #[pyo3(signature = (kind="point", *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None, **unknown))]
+            #[pyo3(
+                text_signature = "($self, kind='point', *, position=None, direction=None, color=None, intensity=1.0, radius=0.1, casts_shadow=None)"
+            )]
             #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
             fn attach_light(
                 &self,
@@ -207,7 +212,9 @@ macro_rules! attachments {
                 intensity: f64,
                 radius: f64,
                 casts_shadow: Option<bool>,
+                unknown: Option<crate::keywords::Unknown<'_, '_>>,
             ) -> Result<()> {
+                crate::keywords::check(unknown, concat!(stringify!($class), ".attach_light"))?;
                 let light = light(kind, [position, direction], color, [intensity, radius], casts_shadow)?;
                 if self.carried()?.1.is_some() {
                     return Err(self.full("light"));

@@ -2,6 +2,7 @@
 
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
 use crate::objects::shape_material::Which;
@@ -73,7 +74,7 @@ impl RigidBody {
     ///
     /// shape: name or index of the part. What is not given stays as it is, for a shape without its own as the body has it at
     /// this time. Without any, the shape is as the body again.
-    #[pyo3(signature = (shape, *, group=None, mask=None, sensor=None))]
+    #[pyo3(signature = (shape, *, group=None, mask=None, sensor=None, **unknown), text_signature = "($self, shape, *, group=None, mask=None, sensor=None)")]
     fn set_shape_filter(
         &self,
         py: Python<'_>,
@@ -81,7 +82,9 @@ impl RigidBody {
         #[pyo3(from_py_with = whole::group)] group: Option<u8>,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: Option<bool>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "RigidBody.set_shape_filter")?;
         let (shape, given) = (self.part_of_compound(shape)?, Given::new(group, mask, sensor)?);
         self.change(py, |body| body.set_shape_filter(shape, given.over(body.shape_filter(shape))))
     }
@@ -104,7 +107,7 @@ impl Articulation {
     ///
     /// shape: name, or number as ``shapes`` of contacts has it. What is not given stays as it is. Without any, a part of a
     /// ``Compound`` is as the compound again.
-    #[pyo3(signature = (link, shape, *, group=None, mask=None, sensor=None))]
+    #[pyo3(signature = (link, shape, *, group=None, mask=None, sensor=None, **unknown), text_signature = "($self, link, shape, *, group=None, mask=None, sensor=None)")]
     fn set_shape_filter(
         &self,
         py: Python<'_>,
@@ -113,7 +116,9 @@ impl Articulation {
         #[pyo3(from_py_with = whole::group)] group: Option<u8>,
         mask: Option<&Bound<'_, PyAny>>,
         sensor: Option<bool>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Articulation.set_shape_filter")?;
         let given = Given::new(group, mask, sensor)?;
         let (place, (part, shape)) = (self.in_world()?, self.of_link(link, shape)?);
         place.write(py, |inner| {

@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{array, some};
 use crate::errors::{Error, Result};
+use crate::keywords::refusal;
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
 use pyo3::exceptions::PyTypeError;
@@ -71,8 +72,8 @@ impl Given {
                         Some(value.extract::<f64>().map_err(|e| wrong(e.value(value.py()).to_string()))?);
                 }
                 _ => {
-                    let unknown = format!("{function}() got an unexpected keyword argument '{word}'");
-                    return Err(PyTypeError::new_err(unknown).into());
+                    let more = [NUMBERS.as_slice(), &["friction_scale", "surface_velocity"]].concat();
+                    return Err(refusal(value.py(), function, &word, &more)?.into());
                 }
             }
         }
@@ -139,7 +140,7 @@ macro_rules! set_shape_material {
                 $($place: $kind),+,
                 surface: Option<&Bound<'_, PyDict>>,
             ) -> Result<()> {
-                let given = Given::of_words("set_shape_material", surface)?;
+                let given = Given::of_words(concat!(stringify!($class), ".set_shape_material"), surface)?;
                 let set: fn(&$class, Python<'_>, Given, $($kind),+) -> Result<()> = $set;
                 set(self, py, given, $($place),+)
             }

@@ -1,8 +1,9 @@
 //! Collision shapes. Sizes are full sizes: edge lengths, and lengths without caps.
 
-use crate::arrays::convert::{number, numbers, path, rotation, shown, some, vec3, vec3_or};
+use crate::arrays::convert::{direction_or, number, numbers, path, rotation, shown, some, vec3};
 use crate::errors::{Error, Result, caught};
 use crate::io::slow;
+use crate::keywords::{self, Unknown};
 use crate::objects::terrain::mesh_of_record;
 use crate::pool;
 use crate::world::pickling::{ShapeRecord, write_shape};
@@ -119,7 +120,8 @@ impl Sphere {
     }
 }
 
-/// A box about its center. size: full edge lengths along x, y and z, meters; one number is a cube.
+/// A box about its center. size: full edge lengths along x, y and z, meters, shape (3,); one number is a cube. ``Box(0.4, 0.2, 0.1)``
+/// is the same as ``Box((0.4, 0.2, 0.1))``.
 /// rounding: radius of edges and corners, meters, below half the shortest edge; the faces stay.
 #[pyclass(frozen, extends = Shape, name = "Box", module = "tumble")]
 pub struct Block;
@@ -127,12 +129,19 @@ pub struct Block;
 #[pymethods]
 impl Block {
     #[new]
-    #[pyo3(signature = (size, *, rounding=0.0))]
-    fn new(size: &Bound<'_, PyAny>, rounding: f64) -> Result<PyClassInitializer<Block>> {
-        let size = match size.extract::<f64>() {
-            Ok(edge) => [number(edge, "size")?; 3],
-            Err(_) => some::<3>(size, "size")?,
-        };
+    #[pyo3(
+        signature = (size, y=None, z=None, *, rounding=0.0, **unknown),
+        text_signature = "(size, y=None, z=None, *, rounding=0.0)"
+    )]
+    fn new(
+        size: &Bound<'_, PyAny>,
+        y: Option<&Bound<'_, PyAny>>,
+        z: Option<&Bound<'_, PyAny>>,
+        rounding: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<PyClassInitializer<Block>> {
+        keywords::check(unknown, "Box")?;
+        let size = three_sizes("Box", size, [y, z])?;
         let [x, y, z] = size;
         if let Some(edge) = size.iter().find(|edge| **edge <= 0.0) {
             return Err(Error::value(format!("size: an edge of {edge} m; edges must be above 0 m")));
@@ -164,8 +173,14 @@ pub struct Cylinder;
 #[pymethods]
 impl Cylinder {
     #[new]
-    #[pyo3(signature = (radius, length, *, rounding=0.0))]
-    fn new(radius: f64, length: f64, rounding: f64) -> Result<PyClassInitializer<Cylinder>> {
+    #[pyo3(signature = (radius, length, *, rounding=0.0, **unknown), text_signature = "(radius, length, *, rounding=0.0)")]
+    fn new(
+        radius: f64,
+        length: f64,
+        rounding: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<PyClassInitializer<Cylinder>> {
+        keywords::check(unknown, "Cylinder")?;
         let length = checked_length(length)?;
         let solid = caught(|| Ok(Solid::rounded_cylinder(radius, length, rounding)?))?;
         let words = format!("Cylinder(radius={radius}, length={length}{})", rounded(rounding));
@@ -178,15 +193,21 @@ fn rounded(rounding: f64) -> String {
     if rounding == 0.0 { String::new() } else { format!(", rounding={rounding}") }
 }
 
-/// An ellipsoid about its center. size: full axes along x, y and z, meters.
+/// An ellipsoid about its center. size: full axes along x, y and z, meters, shape (3,), or three numbers one by one; one number is a
+/// sphere.
 #[pyclass(frozen, extends = Shape, module = "tumble")]
 pub struct Ellipsoid;
 
 #[pymethods]
 impl Ellipsoid {
     #[new]
-    fn new(size: &Bound<'_, PyAny>) -> Result<PyClassInitializer<Ellipsoid>> {
-        let size = some::<3>(size, "size")?;
+    #[pyo3(signature = (size, y=None, z=None))]
+    fn new(
+        size: &Bound<'_, PyAny>,
+        y: Option<&Bound<'_, PyAny>>,
+        z: Option<&Bound<'_, PyAny>>,
+    ) -> Result<PyClassInitializer<Ellipsoid>> {
+        let size = three_sizes("Ellipsoid", size, [y, z])?;
         let [x, y, z] = size;
         let solid = Solid::ellipsoid(Vec3::from(size))?;
         Ok(Shape::new(solid, format!("Ellipsoid(size=({x}, {y}, {z}))")).into_a(Ellipsoid))
@@ -204,6 +225,26 @@ impl Cone {
     fn new(radius: f64, height: f64) -> Result<PyClassInitializer<Cone>> {
         let solid = Solid::cone(radius, height)?;
         Ok(Shape::new(solid, format!("Cone(radius={radius}, height={height})")).into_a(Cone))
+    }
+}
+
+/// Converts full sizes along x, y and z: one number for all, shape (3,), or three numbers one by one.
+fn three_sizes(class: &str, size: &Bound<'_, PyAny>, more: [Option<&Bound<'_, PyAny>>; 2]) -> Result<[f64; 3]> {
+    let edge = |value: &Bound<'_, PyAny>, name: &str| {
+        let wrong = || {
+            let expected = format!("expected {class}((0.4, 0.2, 0.1)) or {class}(0.4, 0.2, 0.1), full sizes in meters");
+            Error::value(format!("{name}: {expected}"))
+        };
+        number(value.extract::<f64>().map_err(|_| wrong())?, name)
+    };
+    match (size.extract::<f64>(), more) {
+        (_, [Some(y), Some(z)]) => Ok([edge(size, "size")?, edge(y, "y")?, edge(z, "z")?]),
+        (Ok(size), [None, None]) => Ok([number(size, "size")?; 3]),
+        (Err(_), [None, None]) => some::<3>(size, "size"),
+        (_, [y, _]) => Err(Error::value(format!(
+            "{}: expected {class}((0.4, 0.2, 0.1)), {class}(0.4, 0.2, 0.1) or one number for all three, full sizes in meters",
+            if y.is_none() { "y" } else { "z" }
+        ))),
     }
 }
 
@@ -228,7 +269,7 @@ impl HalfSpace {
     #[new]
     #[pyo3(signature = (normal=None, offset=0.0), text_signature = "(normal=(0.0, 0.0, 1.0), offset=0.0)")]
     fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> Result<PyClassInitializer<HalfSpace>> {
-        let given = vec3_or(normal, "normal", Vec3::z())?;
+        let given = direction_or(normal, "normal", Vec3::z())?;
         let offset = number(offset, "offset")?;
         let largest = given.amax();
         if largest == 0.0 {
@@ -257,13 +298,15 @@ pub struct Mesh;
 #[pymethods]
 impl Mesh {
     #[new]
-    #[pyo3(signature = (vertices, faces=None, *, scale=1.0))]
+    #[pyo3(signature = (vertices, faces=None, *, scale=1.0, **unknown), text_signature = "(vertices, faces=None, *, scale=1.0)")]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         faces: Option<&Bound<'_, PyAny>>,
         scale: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<Mesh>> {
+        keywords::check(unknown, "Mesh")?;
         let mesh = triangles(py, vertices, faces)?.scaled(checked_scale(scale)?);
         let count = mesh.triangles.len();
         let name = vertices.extract::<std::path::PathBuf>().unwrap_or_else(|_| "Mesh".into());

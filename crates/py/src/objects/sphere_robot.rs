@@ -5,6 +5,7 @@ use crate::arrays::whole;
 use crate::choices::{BUILDERS, MISSING_MESHES, meaning};
 use crate::errors::{Error, Result};
 use crate::interrupt::abandonable;
+use crate::keywords::{self, Unknown};
 use crate::objects::spheretree::settings;
 use crate::pool;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -65,7 +66,7 @@ impl SphereRobot {
     /// ``InvalidValueError``, ``UnreadableFileError`` or ``SceneError`` with the reason. The interpreter is released meanwhile;
     /// Ctrl-C ends the work.
     #[staticmethod]
-    #[pyo3(signature = (path, *, spheres=None, spheres_of=None, coverage=None, coverage_of=None, weight=None, weight_of=None, max_error=None, packages=None, missing_meshes="error", method="medial", cache=true))]
+    #[pyo3(signature = (path, *, spheres=None, spheres_of=None, coverage=None, coverage_of=None, weight=None, weight_of=None, max_error=None, packages=None, missing_meshes="error", method="medial", cache=true, **unknown), text_signature = "(path, *, spheres=None, spheres_of=None, coverage=None, coverage_of=None, weight=None, weight_of=None, max_error=None, packages=None, missing_meshes='error', method='medial', cache=True)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn from_urdf(
         py: Python<'_>,
@@ -81,7 +82,9 @@ impl SphereRobot {
         missing_meshes: &str,
         method: &str,
         cache: bool,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<SphereRobot> {
+        keywords::check(unknown, "SphereRobot.from_urdf")?;
         let file = self::path(path)?;
         let most = spheres.unwrap_or(SPHERES[usize::from(max_error.is_some())]) as usize;
         let error = max_error.unwrap_or(MAX_ERROR);

@@ -6,6 +6,7 @@ use crate::arrays::whole;
 use crate::choices::{BUILDERS, meaning, word};
 use crate::errors::{Error, Result, caught};
 use crate::interrupt::abandonable;
+use crate::keywords::{self, Unknown};
 use crate::objects::shapes::triangles;
 use crate::pool;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -115,7 +116,7 @@ impl SphereTree {
     /// A mesh that is open or encloses nothing, and settings out of range, raise
     /// ``InvalidValueError``. The interpreter is released meanwhile; Ctrl-C ends the build.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces=None, *, method="medial", branching=None, depth=None, max_error=None, cache=true))]
+    #[pyo3(signature = (vertices, faces=None, *, method="medial", branching=None, depth=None, max_error=None, cache=true, **unknown), text_signature = "(vertices, faces=None, *, method='medial', branching=None, depth=None, max_error=None, cache=True)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn build(
         py: Python<'_>,
@@ -126,7 +127,9 @@ impl SphereTree {
         #[pyo3(from_py_with = whole::depth)] depth: Option<u32>,
         max_error: Option<f64>,
         cache: bool,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<SphereTree> {
+        keywords::check(unknown, "SphereTree.build")?;
         let settings = settings(meaning("method", method, BUILDERS)?, branching, depth, max_error);
         let (name, mut mesh) = (name_of(vertices, faces), triangles(py, vertices, faces)?);
         let cache = if cache { TreeCache::of_environment() } else { TreeCache::off() };

@@ -2,6 +2,7 @@
 
 use crate::arrays::convert::{number, numbers, path, shown, some};
 use crate::errors::{Error, Result, caught};
+use crate::keywords::{self, Unknown};
 use crate::objects::shapes::{Mesh, Shape, built, checked_scale, given};
 use crate::pool;
 use pyo3::PyClass;
@@ -42,8 +43,14 @@ pub struct ConvexHull;
 #[pymethods]
 impl ConvexHull {
     #[new]
-    #[pyo3(signature = (points, *, scale=1.0))]
-    fn new(py: Python<'_>, points: &Bound<'_, PyAny>, scale: f64) -> Result<PyClassInitializer<ConvexHull>> {
+    #[pyo3(signature = (points, *, scale=1.0, **unknown), text_signature = "(points, *, scale=1.0)")]
+    fn new(
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        scale: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<PyClassInitializer<ConvexHull>> {
+        keywords::check(unknown, "ConvexHull")?;
         let scale = checked_scale(scale)?;
         let hull = match points.extract::<std::path::PathBuf>() {
             Ok(file) => {
@@ -93,7 +100,7 @@ pub struct HeightField;
 impl HeightField {
     #[new]
     #[pyo3(
-        signature = (heights, size, thickness=None, *, height_range=None),
+        signature = (heights, size, thickness=None, *, height_range=None, **unknown),
         text_signature = "(heights, size, thickness=None, *, height_range=(0.0, 1.0))"
     )]
     fn new(
@@ -102,7 +109,9 @@ impl HeightField {
         size: &Bound<'_, PyAny>,
         thickness: Option<f64>,
         height_range: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<HeightField>> {
+        keywords::check(unknown, "HeightField")?;
         let size = some::<2>(size, "size")?;
         let thickness = thickness.map(|thickness| number(thickness, "thickness")).transpose()?;
         let range = height_range.map_or(Ok([0.0, 1.0]), |range| some::<2>(range, "height_range"))?;
@@ -140,14 +149,16 @@ pub struct Terrain;
 #[pymethods]
 impl Terrain {
     #[new]
-    #[pyo3(signature = (vertices, faces=None, thickness=None, *, scale=1.0))]
+    #[pyo3(signature = (vertices, faces=None, thickness=None, *, scale=1.0, **unknown), text_signature = "(vertices, faces=None, thickness=None, *, scale=1.0)")]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         faces: Option<&Bound<'_, PyAny>>,
         thickness: Option<f64>,
         scale: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<Terrain>> {
+        keywords::check(unknown, "Terrain")?;
         let (mesh, place) = open_surface(py, vertices, faces, scale)?;
         let count = mesh.triangles.len();
         let solid = mesh.terrain(thickness).map_err(|e| Error::value(format!("{place}{e}")))?;
@@ -165,7 +176,7 @@ pub struct OpenMesh;
 #[pymethods]
 impl OpenMesh {
     #[new]
-    #[pyo3(signature = (vertices, faces=None, thickness=None, *, centered=false, scale=1.0))]
+    #[pyo3(signature = (vertices, faces=None, thickness=None, *, centered=false, scale=1.0, **unknown), text_signature = "(vertices, faces=None, thickness=None, *, centered=False, scale=1.0)")]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
@@ -173,7 +184,9 @@ impl OpenMesh {
         thickness: Option<f64>,
         centered: bool,
         scale: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<OpenMesh>> {
+        keywords::check(unknown, "OpenMesh")?;
         let (mesh, place) = open_surface(py, vertices, faces, scale)?;
         let count = mesh.triangles.len();
         let solid = mesh.thickened(thickness, centered).map_err(|e| Error::value(format!("{place}{e}")))?;

@@ -4,6 +4,7 @@ use crate::arrays::convert::{Numbers, numbers, pose, some, unit, vec3, vec3_or};
 use crate::arrays::whole;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::script::{Given, part_of};
 use crate::world::shared::Shared;
 use pyo3::prelude::*;
@@ -41,7 +42,7 @@ impl Action {
     /// Spawns a body of a template at a pose with a velocity of its center of mass, m/s, and an angular velocity, rad/s. source: a body that
     /// throws it: all of them are relative to it and to its motion.
     #[staticmethod]
-    #[pyo3(signature = (template, position=None, orientation=None, velocity=None, angular_velocity=None, *, source=None))]
+    #[pyo3(signature = (template, position=None, orientation=None, velocity=None, angular_velocity=None, *, source=None, **unknown), text_signature = "(template, position=None, orientation=None, velocity=None, angular_velocity=None, *, source=None)")]
     fn spawn(
         template: Given,
         position: Option<&Bound<'_, PyAny>>,
@@ -49,7 +50,9 @@ impl Action {
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
         source: Option<Given>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.spawn")?;
         let deed = Deed::Spawn {
             template,
             pose: pose(position, orientation)?,
@@ -62,21 +65,29 @@ impl Action {
 
     /// An impulse at once, N·s, shape (3,). point: of the frame of the body, m, by default its center of mass.
     #[staticmethod]
-    #[pyo3(signature = (body, impulse, *, point=None))]
-    fn push(body: &Bound<'_, PyAny>, impulse: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<Action> {
+    #[pyo3(signature = (body, impulse, *, point=None, **unknown), text_signature = "(body, impulse, *, point=None)")]
+    fn push(
+        body: &Bound<'_, PyAny>,
+        impulse: &Bound<'_, PyAny>,
+        point: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Action> {
+        keywords::check(unknown, "Action.push")?;
         let point = point.map(|point| vec3(point, "point")).transpose()?;
         Ok(Action { deed: Deed::Push { body: subject(body), impulse: vec3(impulse, "impulse")?, point } })
     }
 
     /// A constant force at the center of mass, N, and a torque, N·m, for a duration, s.
     #[staticmethod]
-    #[pyo3(signature = (body, force=None, torque=None, *, duration))]
+    #[pyo3(signature = (body, force=None, torque=None, *, duration, **unknown), text_signature = "(body, force=None, torque=None, *, duration)")]
     fn force(
         body: &Bound<'_, PyAny>,
         force: Option<&Bound<'_, PyAny>>,
         torque: Option<&Bound<'_, PyAny>>,
         duration: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.force")?;
         let (force, torque) = (vec3_or(force, "force", Vec3::zeros())?, vec3_or(torque, "torque", Vec3::zeros())?);
         Ok(Action { deed: Deed::Force { body: subject(body), force, torque, duration } })
     }
@@ -114,9 +125,10 @@ impl Action {
 
     /// Enables a joint of ``World.add_joint``. here: joins its sides where they are at that moment.
     #[staticmethod]
-    #[pyo3(signature = (joint, *, here=false))]
-    fn attach(joint: Given, here: bool) -> Action {
-        Action { deed: Deed::Attach { joint, here } }
+    #[pyo3(signature = (joint, *, here=false, **unknown), text_signature = "(joint, *, here=False)")]
+    fn attach(joint: Given, here: bool, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.attach")?;
+        Ok(Action { deed: Deed::Attach { joint, here } })
     }
 
     /// Disables a joint.
@@ -135,7 +147,7 @@ impl Action {
     /// Moves a kinematic rigid body along a path through n keyframes. times: since the firing, shape (n,), s, rising. positions: shape (n, 3), m.
     /// orientations: shape (n, 4), by default none. smoothness: ``"c1"`` or ``"c2"``; ends: ``"rest"``, ``"free"`` or ``"loop"``.
     #[staticmethod]
-    #[pyo3(signature = (body, times, positions, orientations=None, *, smoothness="c2", ends="rest"))]
+    #[pyo3(signature = (body, times, positions, orientations=None, *, smoothness="c2", ends="rest", **unknown), text_signature = "(body, times, positions, orientations=None, *, smoothness='c2', ends='rest')")]
     fn move_along(
         body: Given,
         times: &Bound<'_, PyAny>,
@@ -143,7 +155,9 @@ impl Action {
         orientations: Option<&Bound<'_, PyAny>>,
         smoothness: &str,
         ends: &str,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.move_along")?;
         let (times, positions) = (numbers(times, "times")?, numbers(positions, "positions")?);
         let n = times.data.len();
         rows(&positions, "positions", n, 3)?;
@@ -164,20 +178,28 @@ impl Action {
     /// ``"ARTICULATION/LINK"`` for the joint that moves the link. dof: the degree of freedom of that joint, from 0, in the order of
     /// ``Joint.dofs``; of a spherical joint a component of its rotation vector.
     #[staticmethod]
-    #[pyo3(signature = (joint, target, *, dof=0))]
-    fn drive(joint: Given, target: f64, #[pyo3(from_py_with = whole::dof)] dof: usize) -> Action {
-        Action { deed: Deed::Drive { body: joint, dof, target, original: None } }
+    #[pyo3(signature = (joint, target, *, dof=0, **unknown), text_signature = "(joint, target, *, dof=0)")]
+    fn drive(
+        joint: Given,
+        target: f64,
+        #[pyo3(from_py_with = whole::dof)] dof: usize,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Action> {
+        keywords::check(unknown, "Action.drive")?;
+        Ok(Action { deed: Deed::Drive { body: joint, dof, target, original: None } })
     }
 
     /// Looks from a camera by its name, or from an eye at a target, m; vertical_fov: rad.
     #[staticmethod]
-    #[pyo3(signature = (name=None, *, eye=None, target=None, vertical_fov=0.6981317007977318))]
+    #[pyo3(signature = (name=None, *, eye=None, target=None, vertical_fov=0.6981317007977318, **unknown), text_signature = "(name=None, *, eye=None, target=None, vertical_fov=0.6981317007977318)")]
     fn camera(
         name: Option<String>,
         eye: Option<&Bound<'_, PyAny>>,
         target: Option<&Bound<'_, PyAny>>,
         vertical_fov: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.camera")?;
         let change = match (name, eye, target) {
             (Some(name), None, None) => CameraChange::Named(name),
             (None, Some(eye), Some(target)) => {
@@ -190,12 +212,14 @@ impl Action {
 
     /// Changes a light of the scene. number: from 1. intensity: at least 0. color: sRGB, each 0 to 1.
     #[staticmethod]
-    #[pyo3(signature = (number, *, intensity=None, color=None))]
+    #[pyo3(signature = (number, *, intensity=None, color=None, **unknown), text_signature = "(number, *, intensity=None, color=None)")]
     fn light(
         #[pyo3(from_py_with = whole::number)] number: usize,
         intensity: Option<f64>,
         color: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.light")?;
         let light = number.checked_sub(1).ok_or_else(|| Error::value("number: expected 1 for the first light"))?;
         let color = color.map(self::color).transpose()?;
         Ok(Action { deed: Deed::Light(LightChange { light, intensity, color }) })

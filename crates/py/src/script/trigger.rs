@@ -1,6 +1,7 @@
 //! Triggers of events in Python.
 
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::script::{Given, part_of, several};
 use crate::world::shared::Shared;
 use pyo3::prelude::*;
@@ -25,16 +26,23 @@ impl Trigger {
 
     /// Again and again. period: s. first: time of the first firing, s, by default the period.
     #[staticmethod]
-    #[pyo3(signature = (period, *, first=None))]
-    fn every(period: f64, first: Option<f64>) -> Trigger {
-        Trigger { law: Law::Every { period, first: first.unwrap_or(period) } }
+    #[pyo3(signature = (period, *, first=None, **unknown), text_signature = "(period, *, first=None)")]
+    fn every(period: f64, first: Option<f64>, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.every")?;
+        Ok(Trigger { law: Law::Every { period, first: first.unwrap_or(period) } })
     }
 
     /// A body of a and one of b come into contact; without b any body counts. With an impulse, N·s, above 0: whenever the impulse between
     /// two parts in a frame reaches it, in a lasting contact too. The body of b is the *other* one of the event.
     #[staticmethod]
-    #[pyo3(signature = (a, b=None, *, impulse=0.0))]
-    fn contact(a: &Bound<'_, PyAny>, b: Option<&Bound<'_, PyAny>>, impulse: f64) -> Result<Trigger> {
+    #[pyo3(signature = (a, b=None, *, impulse=0.0, **unknown), text_signature = "(a, b=None, *, impulse=0.0)")]
+    fn contact(
+        a: &Bound<'_, PyAny>,
+        b: Option<&Bound<'_, PyAny>>,
+        impulse: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.contact")?;
         Ok(Trigger { law: Law::Contact { a: several(Some(a))?, b: several(b)?, impulse } })
     }
 

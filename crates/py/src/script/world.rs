@@ -2,6 +2,7 @@
 
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::appearance::looking;
 use crate::objects::place::Place;
 use crate::objects::shapes::Shape;
@@ -23,7 +24,7 @@ impl World {
     /// frame, as ``f(view, firing)`` with a ``View`` and a ``Firing``, and returns None or a list of actions that are done at once.
     /// delay: from the trigger to the actions, s. times: how often it fires at most, None for any number. Objects that it names must be
     /// in the world.
-    #[pyo3(signature = (name, when, r#do, *, delay=0.0, times=None), text_signature = "($self, name, when, do, *, delay=0.0, times=None)")]
+    #[pyo3(signature = (name, when, r#do, *, delay=0.0, times=None, **unknown), text_signature = "($self, name, when, do, *, delay=0.0, times=None)")]
     fn add_event(
         &self,
         py: Python<'_>,
@@ -32,7 +33,9 @@ impl World {
         r#do: &Bound<'_, PyAny>,
         delay: f64,
         #[pyo3(from_py_with = whole::times)] times: Option<u32>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<ScriptedEvent> {
+        keywords::check(unknown, "World.add_event")?;
         let given: Vec<Bound<'_, PyAny>> = match r#do.cast::<PyList>() {
             Ok(list) => list.iter().collect(),
             Err(_) => vec![r#do.clone()],
@@ -62,7 +65,7 @@ impl World {
     ///
     /// max: the largest number that is there at a time, 1 to 10,000. reuse: whether the oldest one is spawned again when all are there.
     /// mass, density, restitution, friction: as in ``add_rigid``. color: sRGB, each 0 to 1.
-    #[pyo3(signature = (name, shape, max, *, mass=None, density=None, restitution=0.0, friction=0.5, reuse=false, color=None))]
+    #[pyo3(signature = (name, shape, max, *, mass=None, density=None, restitution=0.0, friction=0.5, reuse=false, color=None, **unknown), text_signature = "($self, name, shape, max, *, mass=None, density=None, restitution=0.0, friction=0.5, reuse=False, color=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_template(
         &self,
@@ -76,7 +79,9 @@ impl World {
         friction: f64,
         reuse: bool,
         color: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Template> {
+        keywords::check(unknown, "World.add_template")?;
         let body = rigid(name, &shape, mass, density, false)?.with_pose(shape.placement).with_material(Material {
             restitution,
             friction,

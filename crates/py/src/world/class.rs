@@ -12,6 +12,7 @@ use crate::arrays::convert::{path, vec3_or};
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::io::slow;
+use crate::keywords::{self, Unknown};
 use crate::objects::place::body_ids;
 use crate::pool;
 use crate::world::gc::{Anchor, anchor};
@@ -89,7 +90,7 @@ impl World {
     )]
     #[pyo3(signature = (gravity=None, dt=0.004166666666666667, stepper="time_stepping", integrator="verlet", solver="gauss_seidel", *, substeps=1, iterations=200,
         contact_tolerance=1e-7, integrator_tolerance=1e-10, sleep_after=None, sleep_within=1e-5, combine_restitution="max", combine_friction="geometric_mean", threads=1, budget=None, event_impulse=0.0, max_turn=1.0,
-        drift_tolerance=None, recovery_speed=3.0, projection_sweeps=15, stabilize_positions=true, solver_tolerance=1e-9, max_relaxations=20000))]
+        drift_tolerance=None, recovery_speed=3.0, projection_sweeps=15, stabilize_positions=true, solver_tolerance=1e-9, max_relaxations=20000, **unknown))]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn new(
         py: Python<'_>,
@@ -116,7 +117,9 @@ impl World {
         stabilize_positions: bool,
         solver_tolerance: f64,
         #[pyo3(from_py_with = whole::max_relaxations)] max_relaxations: u32,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<World> {
+        keywords::check(unknown, "World")?;
         let mut scene = SceneFile::parse("", "World")?;
         let world = &mut scene.world;
         world.gravity_m_per_s2 = vec3_or(gravity, "gravity", Vec3::from(world.gravity_m_per_s2))?.into();
@@ -142,7 +145,7 @@ impl World {
     /// ``MissingFileError`` (a ``FileNotFoundError``); a file with problems raises ``SceneError``
     /// (a ``ValueError``), which lists all of them with line and column.
     #[staticmethod]
-    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None, keyframe=None))]
+    #[pyo3(signature = (path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None, keyframe=None, **unknown), text_signature = "(path_or_name, *, dt=None, stepper=None, integrator=None, solver=None, threads=None, budget=None, keyframe=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn load(
         py: Python<'_>,
@@ -154,7 +157,9 @@ impl World {
         #[pyo3(from_py_with = whole::threads)] threads: Option<u32>,
         #[pyo3(from_py_with = whole::budget)] budget: Option<u32>,
         keyframe: Option<String>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<World> {
+        keywords::check(unknown, "World.load")?;
         let asked = path(path_or_name)?;
         if keyframe.is_some() && !matches!(FileKind::of(&asked), Ok(FileKind::Mjcf)) {
             return Err(Error::value("keyframe: only a model of MuJoCo (.xml) has keyframes"));

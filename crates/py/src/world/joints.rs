@@ -1,6 +1,6 @@
 //! Joints of a world: how they are added and found.
 
-use crate::arrays::convert::{Numbers, numbers, shown, vec3, vec3_or};
+use crate::arrays::convert::{Numbers, direction, direction_or, numbers, shown, vec3};
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
 use crate::objects::builder::pair;
@@ -92,8 +92,8 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
         ground: given.ground.map_or(Ok(Default::default()), points_of)?,
         point,
         second_point: second.filter(|_| kind.has_length()),
-        axis: vec3_or(given.axes[0], "axis", Vec3::z())?,
-        second_axis: given.axes[1].map(|axis| vec3(axis, "second_axis")).transpose()?,
+        axis: direction_or(given.axes[0], "axis", Vec3::z())?,
+        second_axis: given.axes[1].map(|axis| direction(axis, "second_axis")).transpose()?,
     };
     let added = shared.write(py, |inner| {
         let mut joint = LoopJoint::joining(given.name, kind, &inner.world, a, b, place)?;

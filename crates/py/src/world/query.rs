@@ -122,7 +122,7 @@ fn without(filter: QueryFilter, (id, parts): (ObjectId, Option<Vec<usize>>)) -> 
 }
 
 /// Converts what names a body or a link, with the parts that are the shapes of the link.
-fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Option<Vec<usize>>)> {
+pub fn named(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<(ObjectId, Option<Vec<usize>>)> {
     let target = target(shared, value)?;
     Ok((target.id, shared.read(|inner| target.parts(inner))?))
 }
@@ -174,7 +174,13 @@ pub fn cast_rays<'py>(
     max_distance: Option<&Bound<'_, PyAny>>,
     selection: &Selection<'_, '_>,
 ) -> Result<Bound<'py, PyAny>> {
-    let ((origins, _), (directions, _)) = (vectors(origins, "origins")?, vectors(directions, "directions")?);
+    let ((origins, _), directions) = (
+        vectors(origins, "origins")?,
+        match directions.is_instance_of::<pyo3::types::PyString>() {
+            true => vec![crate::arrays::convert::direction(directions, "directions")?],
+            false => vectors(directions, "directions")?.0,
+        },
+    );
     let count = if origins.len() == 1 { directions.len() } else { origins.len() };
     if directions.len() != count && directions.len() != 1 {
         let (n, m) = (origins.len(), directions.len());
@@ -377,7 +383,8 @@ pub fn cast_shape<'py>(
     (position, orientation): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
     selection: &Selection<'_, '_>,
 ) -> Result<Option<Bound<'py, PyAny>>> {
-    let (direction, max_distance) = (vec3(direction, "direction")?, number(max_distance, "max_distance")?);
+    let (direction, max_distance) =
+        (crate::arrays::convert::direction(direction, "direction")?, number(max_distance, "max_distance")?);
     if direction.norm() == 0.0 {
         return Err(Error::value("direction has no length"));
     }

@@ -13,13 +13,13 @@ use crate::parse::joint::{JointSpec, Key, number, read_limits};
 impl JointSpec {
     /// Reads the cone of a spherical joint of a link, the limits of its twist, and the axis of both.
     pub(super) fn read_swing_and_twist(&mut self, f: &mut Fields<'_>) {
-        const EXPECTED: &str = "an axis of the joint's frame: [1, 0, 0], [0, 1, 0] or [0, 0, 1]";
+        const EXPECTED: &str = "an axis of the joint's frame: [1, 0, 0], [0, 1, 0] or [0, 0, 1], or its letter";
         let cone = read_cone(f);
         let twist = read_limits(f, TWIST);
         let mut axis = 2;
         if let Some(value) = f.value("axis") {
             let problems = f.log.count();
-            let given: [f64; 3] = f.as_vector("axis", value, Bound::ANY);
+            let given = f.as_direction("axis", value);
             let along: Vec<usize> = (0..3).filter(|k| given[*k] != 0.0).collect();
             match along[..] {
                 _ if f.log.count() > problems => {}

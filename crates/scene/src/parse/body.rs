@@ -192,10 +192,9 @@ pub(crate) fn read_mask(f: &mut Fields<'_>, default: u64) -> u64 {
 
 /// Reads a direction of any length above 0.
 pub(crate) fn read_direction(f: &mut Fields<'_>, key: &'static str) -> Option<[f64; 3]> {
-    let direction = f.optional_vector(key, Bound::ANY)?;
-    if direction == [0.0; 3]
-        && let Some(value) = f.value(key)
-    {
+    let value = f.value(key)?;
+    let direction = f.as_direction(key, value);
+    if direction == [0.0; 3] {
         f.wrong(key, value, "a direction, such as [0, 0, 1]");
     }
     Some(direction)

@@ -10,6 +10,7 @@ use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::parse::axis::axis_by_name;
 use crate::parse::bound::Bound;
 use crate::parse::log::Log;
 use crate::parse::renamed;
@@ -262,12 +263,21 @@ impl<'a> Fields<'a> {
         out
     }
 
+    /// Returns `value` as a direction of any length: three numbers, or the letter of an axis.
+    pub(crate) fn as_direction(&self, key: &str, value: &Value<'_>) -> [f64; 3] {
+        let Some(word) = value.get_ref().as_str() else { return self.as_vector(key, value, Bound::ANY) };
+        axis_by_name(word).unwrap_or_else(|| {
+            self.wrong(key, value, "a list of 3 numbers, or \"x\", \"y\", \"z\", \"-x\", \"-y\" or \"-z\"");
+            [f64::NAN; 3]
+        })
+    }
+
     /// Returns a direction as a unit vector, or `default`, a unit vector already, if the key is
     /// absent.
     pub(crate) fn direction_or(&mut self, key: &'static str, default: [f64; 3]) -> [f64; 3] {
         let Some(value) = self.value(key) else { return default };
         let problems = self.log.count();
-        let v: [f64; 3] = self.as_vector(key, value, Bound::ANY);
+        let v = self.as_direction(key, value);
         let length = norm(&v);
         if length >= 1e-9 {
             return v.map(|x| x / length);

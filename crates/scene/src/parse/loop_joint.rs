@@ -155,7 +155,7 @@ impl LoopJointSpec {
             _ if !placed => None,
             LoopJointKind::Universal | LoopJointKind::Rack => Some(f.direction("second_axis")),
             LoopJointKind::Planar | LoopJointKind::Spherical => {
-                let x = f.optional_vector::<3>("second_axis", Bound::ANY);
+                let x = f.value("second_axis").map(|value| f.as_direction("second_axis", value));
                 if let (Some(true), Some(value)) = (x.map(|x| x == [0.0; 3]), f.value("second_axis")) {
                     f.wrong("second_axis", value, "a direction: a vector that is not zero");
                 }

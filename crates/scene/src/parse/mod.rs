@@ -2,6 +2,7 @@
 
 pub(crate) mod appearance;
 pub(crate) mod articulated;
+pub(crate) mod axis;
 mod ball_joint;
 pub(crate) mod behavior;
 pub(crate) mod body;

@@ -23,6 +23,35 @@ fn link_with(keys: &str) -> String {
     )
 }
 
+/// Letters of axes mean the unit vectors, in every table that has a direction.
+#[test]
+fn axes_have_letters() {
+    let with = |x: &str, y: &str, minus_z: &str| {
+        format!(
+            "[[body]]\nname = \"b\"\nshape = {{ type = \"box\", size_m = [1, 1, 1] }}\nmass_kg = 1\none_way = {x}\nrotation = {{ axis = {y}, angle_deg = 30 }}\n\
+             [[articulated]]\nname = \"a\"\n[[articulated.link]]\nname = \"l\"\njoint = \"revolute\"\naxis = {minus_z}\nmass_kg = 1\n\
+             inertia_kg_m2 = [1, 1, 1]\n[[articulated.link]]\nname = \"m\"\nparent = \"l\"\njoint = \"spherical\"\naxis = {y}\ncone_deg = 20\n\
+             mass_kg = 1\ninertia_kg_m2 = [1, 1, 1]\n[[loop_joint]]\nname = \"j\"\ntype = \"universal\"\na = \"b\"\nposition_m = [0, 0, 0]\n\
+             axis = {x}\nsecond_axis = {y}\n[[light]]\ntype = \"directional\"\ndirection = {minus_z}\n[camera]\neye_m = [3, 0, 1]\ntarget_m = [0, 0, 0]\nup = {y}\n"
+        )
+    };
+    let letters = read(&with("\"x\"", "\"y\"", "\"-z\""));
+    let numbers = read(&with("[1, 0, 0]", "[0, 1, 0]", "[0, 0, -1]"));
+    assert_eq!(format!("{:?}", letters.articulated), format!("{:?}", numbers.articulated));
+    assert_eq!(format!("{:?}", letters.loop_joints), format!("{:?}", numbers.loop_joints));
+    assert_eq!(format!("{:?}", letters.bodies), format!("{:?}", numbers.bodies));
+    let states = [&letters, &numbers].map(|scene| scene.build().unwrap().0.state().to_vec());
+    assert_eq!(states[0], states[1]);
+    let Joint::Revolute { axis } = letters.articulated[0].links[0].joint.kind else { panic!("a hinge") };
+    assert_eq!(axis, Vec3::new(0.0, 0.0, -1.0));
+    assert_errors(
+        &link_with("").replace("[0, 0, 2]", "\"w\""),
+        &[
+            "s.toml:6:8: `axis` of link \"l\" is \"w\"; expected a list of 3 numbers, or \"x\", \"y\", \"z\", \"-x\", \"-y\" or \"-z\"",
+        ],
+    );
+}
+
 #[test]
 fn the_example_of_every_key_means_what_it_says() {
     let scene = read(examples()[0]);

@@ -2,11 +2,12 @@
 //! spring, a drive (thesis §III.B.7, §IV.A.4).
 //!
 //! Limits, dry friction and drives become rows, which are solved together with all contacts. In
-//! `time_stepping` damping and drives are implicit over a step `h`:
+//! `time_stepping` damping, springs and drives are implicit over a step `h`:
 //!
 //! ```text
 //! position drive    τ = k(q* − q − h·q̇⁺) + c(q̇* − q̇⁺)      row  q̇⁺ + R·λ = (k(q* − q) + c·q̇*)/(c + h·k),   R = 1/(h(c + h·k)),   |λ| ≤ h·τ_max
 //! damping           τ = −c·q̇⁺                               row  q̇⁺ + R·λ = 0,                               R = 1/(h·c)
+//! spring            τ = k(q₀ − (q + q⁺)/2)                   row  q̇⁺ + R·λ = q̇ − 4(q + ½h·q̇ − q₀)/h,        R = 4/(h²k)
 //! velocity drive    any τ with |τ| ≤ τ_max                   row  q̇⁺ = q̇*,                                    |λ| ≤ h·τ_max
 //! dry friction      against the motion, |τ| ≤ τ_f            row  q̇⁺ = 0,                                     |λ| ≤ h·τ_f
 //! velocity limit    −q̇_max ≤ q̇⁺ ≤ q̇_max                      rows ±q̇⁺ + q̇_max ≥ 0 ⟂ λ ≥ 0
@@ -15,9 +16,9 @@
 //! so no gain is too stiff for the step. `backtracking` does the same, with forces that hold over
 //! the sub-step, if any soft row changes its velocity by more than half of it. Otherwise the rows are
 //! those of the middle of the sub-step with `verlet` (implicit midpoint rule), and with the other
-//! integrators damping and position drives are forces, as accurate as the integrator. Springs of
-//! joints with one degree of freedom are forces in both steppers; those of spherical joints are rows wherever drives are,
-//! by the implicit midpoint rule of loop joints.
+//! integrators damping, springs and position drives are forces, as accurate as the integrator. The rule of springs is the
+//! implicit midpoint rule, which keeps their energy: a spring far stiffer than the step resolves swings by `±q` from step to
+//! step and needs damping to come to rest.
 //!
 //! Settings of degree of freedom `k` of a spherical joint act about axis `k` of the link. Rest positions and targets of the
 //! three are the components of one rotation vector `g` in the joint's frame, and the positions are `q = g + log(G⁻¹·R)` with
@@ -26,6 +27,7 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `q, q̇` | position (rad or m) and velocity of the degree of freedom; `⁺` at the end of the step |
+//! | `q₀` | rest position of the spring |
 //! | `k, c` | stiffness, N·m/rad or N/m, and damping, N·m·s/rad or N·s/m |
 //! | `λ = h·τ` | impulse of the row |
 //! | `q̇_max` | [`DofSettings::max_velocity`]: a stop that takes whatever force it needs, like a limit |
@@ -78,9 +80,7 @@ impl Default for DofSettings {
     }
 }
 
-/// A linear spring on a joint. On a joint with one degree of freedom of an articulated body it is an explicit force: keep
-/// `stiffness·dt²` below the inertia that it moves, or use [`Drive::Position`]. Those of spherical joints and of loop joints are
-/// implicit.
+/// A linear spring on a joint. It is implicit, so no stiffness is too large for the step; damping brings it to rest.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
     /// Stiffness, N·m/rad or N/m, at least 0.
@@ -205,7 +205,7 @@ impl DofSettings {
         })
     }
 
-    /// Returns the generalized force of the spring, which is explicit in every stepper.
+    /// Returns the generalized force of the spring, for steps whose rows are not implicit.
     pub(crate) fn spring_force(&self, q: f64) -> f64 {
         self.spring.map_or(0.0, |s| s.stiffness * (s.rest - q))
     }

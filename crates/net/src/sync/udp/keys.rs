@@ -35,6 +35,9 @@ impl std::fmt::Debug for SharedKey {
     }
 }
 
+/// A key file as it should be.
+const WANTED: &str = "expected are 64 hexadecimal digits (32 bytes); make one with: head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \\n'";
+
 impl SharedKey {
     /// Returns a public key: it detects damage and no forgery. It is used on loopback addresses
     /// only.
@@ -77,29 +80,36 @@ impl SharedKey {
                 return Err(refuse(format!("mode {mode:03o} lets others read it; run: chmod 600 {}", path.display())));
             }
         }
-        let wanted = "expected are 64 hexadecimal digits (32 bytes); make one with: head -c 32 /dev/urandom | od -An -tx1 | tr -d ' \\n'";
         if about.len() > 256 {
-            return Err(refuse(format!("{} bytes long; {wanted}", about.len())));
+            return Err(refuse(format!("{} bytes long; {WANTED}", about.len())));
         }
         let mut text = Vec::new();
         std::io::Read::read_to_end(&mut std::io::Read::take(file, 256), &mut text)
             .map_err(|why| LinkError::Io { what: format!("key file {}", path.display()), why })?;
-        let text = String::from_utf8(text).map_err(|_| refuse(format!("not text; {wanted}")))?;
+        SharedKey::parse(&text).map_err(refuse)
+    }
+
+    /// Parses the content of a key file.
+    ///
+    /// # Errors
+    /// The fault.
+    pub fn parse(text: &[u8]) -> Result<SharedKey, String> {
+        let text = std::str::from_utf8(text).map_err(|_| format!("not text; {WANTED}"))?;
         let digits = text.trim().as_bytes();
         if digits.len() != 64 {
-            return Err(refuse(format!("{} digits; {wanted}", digits.len())));
+            return Err(format!("{} digits; {WANTED}", digits.len()));
         }
         let mut bytes = [0; 32];
         for (k, pair) in digits.chunks_exact(2).enumerate() {
             let digit = |at: usize| {
                 (pair[at] as char)
                     .to_digit(16)
-                    .ok_or_else(|| refuse(format!("character {} is no hexadecimal digit; {wanted}", 2 * k + at + 1)))
+                    .ok_or_else(|| format!("character {} is no hexadecimal digit; {WANTED}", 2 * k + at + 1))
             };
             bytes[k] = (digit(0)? * 16 + digit(1)?) as u8;
         }
         if bytes == [0; 32] {
-            return Err(refuse(format!("all zeros; {wanted}")));
+            return Err(format!("all zeros; {WANTED}"));
         }
         Ok(SharedKey::new(bytes))
     }

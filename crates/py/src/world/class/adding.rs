@@ -1,9 +1,10 @@
 //! Bodies, joints and sensors that a program adds to a world.
 
-use crate::arrays::convert::{pose, vec3, vec3_or};
+use crate::arrays::convert::{direction, pose, vec3, vec3_or};
 use crate::arrays::whole;
 use crate::choices::meaning;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::{self, RigidBody};
 use crate::objects::joint::Joint;
@@ -41,7 +42,7 @@ impl World {
     /// ``tumble.Intersect``, the body's own intersection test; the shape then surrounds the true surface. one_way: as
     /// the property. appearance: a ``tumble.Appearance``, by default one of a few colors in turn.
     #[pyo3(signature = (name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0,
-        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None, one_way=None, appearance=None))]
+        friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=false, collidable=true, contacts="surface", group=0, mask=None, sensor=false, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=false, intersect=None, one_way=None, appearance=None, **unknown), text_signature = "($self, name=None, shape=None, mass=None, density=None, position=None, orientation=None, velocity=None, angular_velocity=None, restitution=0.0, friction=0.5, *, linear_damping=0.0, angular_damping=0.0, kinematic=False, collidable=True, contacts='surface', group=0, mask=None, sensor=False, inertia=None, center_of_mass=None, gravity_scale=1.0, locked=None, non_spinning=False, intersect=None, one_way=None, appearance=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_rigid(
         &self,
@@ -72,7 +73,9 @@ impl World {
         intersect: Option<&Bound<'_, PyAny>>,
         one_way: Option<&Bound<'_, PyAny>>,
         appearance: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<RigidBody> {
+        keywords::check(unknown, "World.add_rigid")?;
         let (name, shape) = named_shape(name, shape)?;
         let mode = if kinematic { Mode::Kinematic } else { Mode::Dynamic };
         let motion = [
@@ -102,13 +105,13 @@ impl World {
             body = body.with_center_of_mass(vec3(center, "center_of_mass")?);
         }
         let mut body = body.with_velocity(motion[0]).with_angular_velocity(motion[1]);
-        body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
+        body.one_way = one_way.map(|given| direction(given, "one_way")).transpose()?;
         add(&self.shared, py, body, mode, collidable, intersect, appearance)
     }
 
     /// Adds geometry that never moves. name, position, orientation, restitution, friction, contacts,
     /// group, mask, sensor, intersect, one_way, appearance: as in ``add_rigid``; by default gray, planes checkered.
-    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None, one_way=None, appearance=None))]
+    #[pyo3(signature = (name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=true, contacts="surface", group=0, mask=None, sensor=false, intersect=None, one_way=None, appearance=None, **unknown), text_signature = "($self, name=None, shape=None, position=None, orientation=None, restitution=0.0, friction=0.5, *, collidable=True, contacts='surface', group=0, mask=None, sensor=False, intersect=None, one_way=None, appearance=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_static(
         &self,
@@ -127,7 +130,9 @@ impl World {
         intersect: Option<&Bound<'_, PyAny>>,
         one_way: Option<&Bound<'_, PyAny>>,
         appearance: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<RigidBody> {
+        keywords::check(unknown, "World.add_static")?;
         let (name, shape) = named_shape(name, shape)?;
         let pose = pose(position, orientation)? * shape.placement;
         let mut body = solid(&shape)
@@ -137,7 +142,7 @@ impl World {
             .with_contact_mode(meaning("contacts", contacts, ContactMode::NAMES)?)
             .with_groups(query::group(group)?, query::mask(mask)?)
             .with_sensor(sensor);
-        body.one_way = one_way.map(|direction| vec3(direction, "one_way")).transpose()?;
+        body.one_way = one_way.map(|given| direction(given, "one_way")).transpose()?;
         add(&self.shared, py, body, Mode::Static, collidable, intersect, appearance)
     }
 
@@ -147,14 +152,16 @@ impl World {
     /// of its base: a position (3,), or position and quaternion (7,), meters and (x, y, z, w). name: by default the
     /// description's. It starts with the ``q``, ``qd`` and ``tau`` of the description; the pose of
     /// a floating root is relative to the base.
-    #[pyo3(signature = (articulation, base=None, *, name=None))]
+    #[pyo3(signature = (articulation, base=None, *, name=None, **unknown), text_signature = "($self, articulation, base=None, *, name=None)")]
     fn add_articulation(
         &self,
         py: Python<'_>,
         articulation: &Bound<'_, PyAny>,
         base: Option<&Bound<'_, PyAny>>,
         name: Option<&str>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Articulation> {
+        keywords::check(unknown, "World.add_articulation")?;
         articulated(&self.shared, py, articulation, base, name)
     }
 
@@ -188,7 +195,7 @@ impl World {
     /// side: of the angles that its frames have now it takes the nearest to this number.
     #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
         second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None,
-        cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None, angle=None))]
+        cone=None, max_velocity=None, effort=None, armature=0.0, twist_limits=None, dofs=None, angle=None, **unknown))]
     #[pyo3(
         text_signature = "($self, kind, a, b=None, point=None, axis=(0.0, 0.0, 1.0), limits=None, drive=None, breaking_force=None, *, name='', \
         second_point=None, second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, \
@@ -227,7 +234,9 @@ impl World {
         twist_limits: Option<&Bound<'_, PyAny>>,
         dofs: Option<Vec<Bound<'_, PyDict>>>,
         angle: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Joint> {
+        keywords::check(unknown, "World.add_joint")?;
         let given = joints::Arguments {
             kind,
             sides: [a, b],
@@ -264,7 +273,7 @@ impl World {
     /// links that a revolute or prismatic joint moves, ``"ARTICULATION/LINK"`` or ``(articulation, "LINK")``. Together they
     /// join two bodies that move at most. multiplier: not 0; between two angles of joints without limits a ratio of whole
     /// numbers up to 1000. offset: rad or m, as the position of ``joint``.
-    #[pyo3(signature = (joint, of, multiplier=1.0, offset=0.0, *, name=""))]
+    #[pyo3(signature = (joint, of, multiplier=1.0, offset=0.0, *, name="", **unknown), text_signature = "($self, joint, of, multiplier=1.0, offset=0.0, *, name='')")]
     fn add_mimic(
         &self,
         py: Python<'_>,
@@ -273,7 +282,9 @@ impl World {
         multiplier: f64,
         offset: f64,
         name: &str,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Mimic> {
+        keywords::check(unknown, "World.add_mimic")?;
         mimics::add(&self.shared, py, [joint, of], [multiplier, offset], name)
     }
 
@@ -300,7 +311,7 @@ impl World {
     /// image has one bias; a segmentation has no noise. With a delay a camera makes its image after every step, and keeps it
     /// in the state.
     #[pyo3(signature = (kind, on=None, *, name="", position=None, orientation=None, relative_to=None, volume=None, cutoff=None, deviation=0.0,
-        bias_walk=0.0, quantization=0.0, delay=0, seed=0, resolution=None, vertical_fov=None))]
+        bias_walk=0.0, quantization=0.0, delay=0, seed=0, resolution=None, vertical_fov=None, **unknown), text_signature = "($self, kind, on=None, *, name='', position=None, orientation=None, relative_to=None, volume=None, cutoff=None, deviation=0.0, bias_walk=0.0, quantization=0.0, delay=0, seed=0, resolution=None, vertical_fov=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_sensor(
         &self,
@@ -320,7 +331,9 @@ impl World {
         #[pyo3(from_py_with = whole::seed)] seed: u64,
         #[pyo3(from_py_with = whole::resolution)] resolution: Option<[u32; 2]>,
         vertical_fov: Option<f64>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Sensor> {
+        keywords::check(unknown, "World.add_sensor")?;
         let noise = SensorNoise { deviation, bias_walk, quantization, delay, seed };
         let given = sensors::Arguments {
             kind,

@@ -2,6 +2,7 @@
 
 use crate::behaviors;
 use crate::errors::Result;
+use crate::keywords::{self, Unknown};
 use crate::objects::articulation::Articulation;
 use crate::objects::bodies;
 use crate::objects::bodies::{Bodies, handle, place_of};
@@ -29,7 +30,7 @@ impl World {
     /// with the links fixed to it. None keeps the rule; without all the pair has no constants of
     /// its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
     /// include materials.
-    #[pyo3(signature = (a, b, *, restitution=None, friction=None, collides=None))]
+    #[pyo3(signature = (a, b, *, restitution=None, friction=None, collides=None, **unknown), text_signature = "($self, a, b, *, restitution=None, friction=None, collides=None)")]
     fn set_pair_material(
         &self,
         py: Python<'_>,
@@ -38,7 +39,9 @@ impl World {
         restitution: Option<f64>,
         friction: Option<f64>,
         collides: Option<bool>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "World.set_pair_material")?;
         pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction, collides })
     }
 

@@ -3,6 +3,7 @@
 use crate::arrays::convert::vector;
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::place::body_ids;
 use crate::objects::shapes::Shape;
 use crate::world::add::own_place;
@@ -28,6 +29,24 @@ impl World {
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyAny>> {
         contacts::array(py, self.shared.read(|inner| Ok(contacts::bytes(inner)))?)
+    }
+
+    /// Returns the sum of the contact forces of ``a`` on ``b`` in the last sub-step, shape (3,), N, world axes, without impacts; zero if
+    /// they do not touch.
+    ///
+    /// a, b: a body, an articulation or a link: a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link). A link is its own
+    /// shapes, without those of links fixed to it.
+    fn contact_force<'py>(
+        &self,
+        py: Python<'py>,
+        a: &Bound<'py, PyAny>,
+        b: &Bound<'py, PyAny>,
+    ) -> Result<Bound<'py, PyArray1<f64>>> {
+        let ((a, parts_a), (b, parts_b)) = (query::named(&self.shared, a)?, query::named(&self.shared, b)?);
+        let force = self
+            .shared
+            .read(|inner| Ok(inner.world.contact_force_of((a, parts_a.as_deref()), (b, parts_b.as_deref()))?))?;
+        Ok(vector(py, &force))
     }
 
     /// The events of the last step, a list of ``Event`` tuples: ``kind``, ``a``, ``b``, ``parts``,
@@ -88,7 +107,7 @@ impl World {
     /// groups that it finds, as bits of an integer or a sequence; None for all) like a body, and does not find the ignored bodies and links (handles, a
     /// name, ``"ARTICULATION/LINK"``, (articulation, link), or a list of them). as_body: a body or a link; the query then finds only what could have contacts
     /// with it, by groups, masks, pairs and excluded links. Sensors are not found. Runs on ``threads`` threads, which change no bit.
-    #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, origins, directions, max_distance=None, *, group=0, mask=None, ignore=None, as_body=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn cast_rays<'py>(
         &self,
@@ -100,7 +119,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyAny>> {
+        keywords::check(unknown, "World.cast_rays")?;
         query::cast_rays(
             &self.shared,
             py,
@@ -118,7 +139,7 @@ impl World {
     /// finite. position, orientation: where it starts. Fields: ``distance``, m, 0 if it overlaps at
     /// the start; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), m;
     /// ``normal`` (3,), unit, from the body towards the shape.
-    #[pyo3(signature = (shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, shape, direction, max_distance, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn cast_shape<'py>(
         &self,
@@ -132,7 +153,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
+        keywords::check(unknown, "World.cast_shape")?;
         let (at, selection) = ((position, orientation), Selection { group, mask, ignore, as_body });
         query::cast_shape(&self.shared, py, &shape, direction, max_distance, at, &selection)
     }
@@ -141,7 +164,7 @@ impl World {
     /// ``part`` and ``shape``, as in ``cast_rays``, and ``depth``, that of the deepest contact, m.
     ///
     /// position, orientation: as in ``add_rigid``. group, mask, ignore, as_body: as in ``cast_rays``.
-    #[pyo3(signature = (shape, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (shape, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, shape, position=None, orientation=None, *, group=0, mask=None, ignore=None, as_body=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn overlaps<'py>(
         &self,
@@ -153,7 +176,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyAny>> {
+        keywords::check(unknown, "World.overlaps")?;
         query::overlaps(&self.shared, py, &shape, (position, orientation), &Selection { group, mask, ignore, as_body })
     }
 
@@ -164,7 +189,7 @@ impl World {
     /// negative depth if they overlap; ``bodies`` (2,), ``parts`` (2,) and ``shapes`` (2,) as in ``contacts``, -1
     /// for a shape; ``points`` (2, 3), on the surfaces, world, m; ``normal`` (3,), unit, from the second to
     /// the first. group, mask, ignore, as_body: of a shape, as in ``cast_rays``.
-    #[pyo3(signature = (a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, a, b=None, *, position=None, orientation=None, group=0, mask=None, ignore=None, as_body=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn closest_points<'py>(
         &self,
@@ -177,7 +202,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Option<Bound<'py, PyAny>>> {
+        keywords::check(unknown, "World.closest_points")?;
         query::closest_points(
             &self.shared,
             py,
@@ -191,7 +218,7 @@ impl World {
     /// Returns the numbers in ``world.bodies`` of the bodies that contain a point: shape (k,).
     ///
     /// point: shape (3,), m. The surface belongs to a body. group, mask, ignore, as_body: as in ``cast_rays``.
-    #[pyo3(signature = (point, *, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (point, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, point, *, group=0, mask=None, ignore=None, as_body=None)")]
     fn contains<'py>(
         &self,
         py: Python<'py>,
@@ -200,7 +227,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyArray1<i64>>> {
+        keywords::check(unknown, "World.contains")?;
         query::contains(&self.shared, py, point, &Selection { group, mask, ignore, as_body })
     }
 
@@ -211,7 +240,7 @@ impl World {
     /// point outside of all bodies minus the distance from the nearest one, minus infinity if there
     /// is none; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
     /// point of the surface, m; ``normal`` (3,), unit, outward.
-    #[pyo3(signature = (points, *, group=0, mask=None, ignore=None, as_body=None))]
+    #[pyo3(signature = (points, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, points, *, group=0, mask=None, ignore=None, as_body=None)")]
     fn point_depth<'py>(
         &self,
         py: Python<'py>,
@@ -220,7 +249,9 @@ impl World {
         mask: Option<&Bound<'_, PyAny>>,
         ignore: Option<&Bound<'_, PyAny>>,
         as_body: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyAny>> {
+        keywords::check(unknown, "World.point_depth")?;
         query::point_depth(&self.shared, py, points, &Selection { group, mask, ignore, as_body })
     }
 

@@ -1,11 +1,12 @@
 //! Saved, copied and forked worlds, and rollouts.
 
-use crate::arrays::convert::{numbers, path};
+use crate::arrays::convert::{Numbers, numbers, path};
 use crate::arrays::whole;
 use crate::batch::crew;
-use crate::errors::Result;
+use crate::errors::{Error, Result};
 use crate::extension::callbacks::{Extensions, Reduced};
 use crate::interrupt::interruptible;
+use crate::keywords::{self, Unknown};
 use crate::world::add::own_place;
 use crate::world::class::World;
 use crate::world::rollout::Plan;
@@ -92,26 +93,47 @@ impl World {
     ///
     /// controls: shape (forks, steps, n): generalized forces of each step, N·m and N, for all
     /// ``articulations`` one after the other (by default all of the world, in order; without any, n
-    /// is 0). states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
+    /// is 0). Without controls generalized forces stay as they are: then steps is the number of steps, and forks that of
+    /// forks, by default as many as states, or 1. states: initial states of the forks, shape (len(state),) or (forks, len(state)), by
     /// default the state of the world. every: interval in steps at which the state is kept.
     /// threads: largest number of threads (default: all cores). Returns the states, shape (forks,
     /// steps // every, len(state)): the same bits on any number of threads. A fork that fails
     /// raises ``StepError`` with its number; Ctrl-C stops all of them between two steps.
-    #[pyo3(signature = (controls, *, articulations=None, states=None, every=1, threads=None))]
+    #[pyo3(signature = (controls=None, *, steps=None, forks=None, articulations=None, states=None, every=1, threads=None, **unknown), text_signature = "($self, controls=None, *, steps=None, forks=None, articulations=None, states=None, every=1, threads=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn rollout<'py>(
         &self,
         py: Python<'py>,
-        controls: &Bound<'py, PyAny>,
+        controls: Option<&Bound<'py, PyAny>>,
+        #[pyo3(from_py_with = whole::steps)] steps: Option<usize>,
+        #[pyo3(from_py_with = whole::forks)] forks: Option<usize>,
         articulations: Option<Vec<Bound<'py, PyAny>>>,
         states: Option<&Bound<'py, PyAny>>,
         #[pyo3(from_py_with = whole::every)] every: usize,
         #[pyo3(from_py_with = whole::threads)] threads: Option<usize>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyArray3<f64>>> {
+        keywords::check(unknown, "World.rollout")?;
         let threads = crew::checked(threads)?;
         let asked = articulations
             .map(|all| all.iter().map(|one| Ok(own_place(&self.shared, one)?.id)).collect::<Result<Vec<_>>>())
             .transpose()?;
-        let (controls, states) = (numbers(controls, "controls")?, states.map(|s| numbers(s, "states")).transpose()?);
+        let states = states.map(|s| numbers(s, "states")).transpose()?;
+        let (controls, asked) = match controls {
+            Some(_) if steps.is_some() || forks.is_some() => {
+                return Err(Error::value("steps and forks: expected none, since controls have their shape"));
+            }
+            Some(controls) => (numbers(controls, "controls")?, asked),
+            None if asked.is_some() => {
+                return Err(Error::value("articulations: expected none, since there are no controls for them"));
+            }
+            None => {
+                let steps = steps.ok_or_else(|| Error::value("steps: expected their number, or controls"))?;
+                let many = states.as_ref().and_then(|all| (all.shape.len() == 2).then(|| all.shape[0]));
+                let shape = vec![forks.or(many).unwrap_or(1), steps, 0];
+                (Numbers { shape, data: vec![] }, Some(vec![]))
+            }
+        };
         let (plan, fork) =
             self.shared.read(|inner| Ok((Plan::new(inner, asked, controls, states, every)?, inner.fork())))?;
         let shape = [plan.count, plan.frames / plan.every, fork.world.state().len()];

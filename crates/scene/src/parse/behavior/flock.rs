@@ -118,7 +118,7 @@ impl BodyFlockSpec {
             agility: at_least_0("agility_per_s", usual.agility),
             max_angular_acceleration: at_least_0("max_angular_acceleration_rad_per_s2", usual.max_angular_acceleration),
             bank_time: at_least_0("bank_time_s", usual.bank_time),
-            up: Vec3::from(f.vector_or("up", Bound::ANY, usual.up.into())),
+            up: f.value("up").map_or(usual.up, |value| Vec3::from(f.as_direction("up", value))),
             wind: Vec3::from(f.vector_or("wind_m_per_s", Bound::ANY, usual.wind.into())),
         };
         if let Some(up) = f.value("up").filter(|_| helm.up == Vec3::zeros()) {
