@@ -50,6 +50,7 @@ use crate::sensor::loads::SubstepForces;
 use crate::settings::{Integrator, Settings};
 use crate::solver::SolverSettings;
 use crate::world::{Coordinates, Core, StepError};
+use nalgebra::ComplexField;
 use tumble_collide::NormalFrom;
 
 /// The stepper of the thesis, `backtracking`.
@@ -101,7 +102,7 @@ fn next_length(core: &Core, (h, went): (f64, f64), error: f64) -> f64 {
     }
     // the error of a sub-step is of third order
     let goal = 0.5 * extrapolation::SAFETY * core.settings.integrator_tolerance;
-    let factor = (goal / error.max(f64::MIN_POSITIVE)).cbrt();
+    let factor = ComplexField::cbrt(goal / error.max(f64::MIN_POSITIVE));
     h * if went == 0.0 { factor.clamp(0.1, 0.5) } else { factor.clamp(0.5, 2.0) }
 }
 

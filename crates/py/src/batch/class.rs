@@ -239,6 +239,7 @@ impl Batch {
     /// ``failed`` says which. It stays as before the step that failed, and ``reset`` serves it as any
     /// other.
     #[pyo3(signature = (controls=None, substeps=1, *, targets=None, policy=None, mask=None, **unknown), text_signature = "($self, controls=None, substeps=1, *, targets=None, policy=None, mask=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn step(
         &self,
         py: Python<'_>,
@@ -306,6 +307,7 @@ impl Batch {
     /// spherical joint has three columns, and a floating root six, which must be 0. Drives and their
     /// targets are no part of the state, so ``reset`` leaves them.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=None, damping=None, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=None, damping=None, max_force=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drives(
         &self,
         py: Python<'_>,

@@ -1,6 +1,6 @@
 //! Flocks of rigid and articulated bodies.
 
-use crate::arrays::convert::{some, vector};
+use crate::arrays::convert::vector;
 use crate::behaviors::flock::{steering, steering_dict};
 use crate::behaviors::placed;
 use crate::errors::{Error, Result};
@@ -13,7 +13,6 @@ use crate::world::gc::Anchor;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::behaviors::{BodyFlock, Helm, Steering};
-use tumble::collide::Vec3;
 
 /// A flock of rigid and articulated bodies of a world: the forces of a flock on their centers of mass, and torques that turn the nose (x)
 /// of each, or of its first link, along its velocity and bank it into turns.

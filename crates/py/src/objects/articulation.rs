@@ -101,6 +101,7 @@ impl Articulation {
     /// velocities of joints are enforced, as ``max_velocity``, against any force; False: they are read and have no effect.
     #[staticmethod]
     #[pyo3(signature = (path, *, floating=false, packages=None, missing_meshes="error", collision_meshes="exact", velocity_limits=false, **unknown), text_signature = "(path, *, floating=False, packages=None, missing_meshes='error', collision_meshes='exact', velocity_limits=False)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     pub fn from_urdf(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,

@@ -249,6 +249,7 @@ impl Joint {
     /// the shorter way if the joint has no limits. max_force: None: its ``effort``. target and velocity may be sequences with
     /// a number for each of its ``dofs``, which all get a drive then; a number is that of the first one, of a ``"spherical"`` joint of all three.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
         &self,
         py: Python<'_>,

@@ -58,6 +58,7 @@ impl JointDof {
 
     /// Sets its drive; the arguments are those of ``Joint.set_drive``.
     #[pyo3(signature = (*, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None, **unknown), text_signature = "($self, *, target=None, velocity=None, stiffness=0.0, damping=0.0, max_force=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_drive(
         &self,
         py: Python<'_>,

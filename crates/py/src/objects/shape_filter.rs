@@ -108,6 +108,7 @@ impl Articulation {
     /// shape: name, or number as ``shapes`` of contacts has it. What is not given stays as it is. Without any, a part of a
     /// ``Compound`` is as the compound again.
     #[pyo3(signature = (link, shape, *, group=None, mask=None, sensor=None, **unknown), text_signature = "($self, link, shape, *, group=None, mask=None, sensor=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_shape_filter(
         &self,
         py: Python<'_>,

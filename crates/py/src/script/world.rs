@@ -25,6 +25,7 @@ impl World {
     /// delay: from the trigger to the actions, s. times: how often it fires at most, None for any number. Objects that it names must be
     /// in the world.
     #[pyo3(signature = (name, when, r#do, *, delay=0.0, times=None, **unknown), text_signature = "($self, name, when, do, *, delay=0.0, times=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_event(
         &self,
         py: Python<'_>,

@@ -154,7 +154,7 @@ fn dead_rows_get_no_multiplier() {
 #[test]
 fn a_contact_in_a_plane_sticks_at_once_and_slides_as_coulomb_says() {
     let (normal, along) = ([0.9, 1.0], [1.0, -0.2]);
-    for heading in [0.0f64, 0.3, 1.5707963, 2.0] {
+    for heading in [0.0f64, 0.3, 1.5, 2.0] {
         let tangents = [heading.cos(), heading.sin()];
         let mut rows = Rows::default();
         rows.clear(2);

@@ -274,6 +274,7 @@ impl World {
     /// join two bodies that move at most. multiplier: not 0; between two angles of joints without limits a ratio of whole
     /// numbers up to 1000. offset: rad or m, as the position of ``joint``.
     #[pyo3(signature = (joint, of, multiplier=1.0, offset=0.0, *, name="", **unknown), text_signature = "($self, joint, of, multiplier=1.0, offset=0.0, *, name='')")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn add_mimic(
         &self,
         py: Python<'_>,

@@ -31,6 +31,7 @@ impl World {
     /// its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
     /// include materials.
     #[pyo3(signature = (a, b, *, restitution=None, friction=None, collides=None, **unknown), text_signature = "($self, a, b, *, restitution=None, friction=None, collides=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_pair_material(
         &self,
         py: Python<'_>,

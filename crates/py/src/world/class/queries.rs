@@ -219,6 +219,7 @@ impl World {
     ///
     /// point: shape (3,), m. The surface belongs to a body. group, mask, ignore, as_body: as in ``cast_rays``.
     #[pyo3(signature = (point, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, point, *, group=0, mask=None, ignore=None, as_body=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn contains<'py>(
         &self,
         py: Python<'py>,
@@ -241,6 +242,7 @@ impl World {
     /// is none; ``body``, ``part``, ``shape`` and the filter as in ``cast_rays``; ``point`` (3,), the closest
     /// point of the surface, m; ``normal`` (3,), unit, outward.
     #[pyo3(signature = (points, *, group=0, mask=None, ignore=None, as_body=None, **unknown), text_signature = "($self, points, *, group=0, mask=None, ignore=None, as_body=None)")]
+    #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn point_depth<'py>(
         &self,
         py: Python<'py>,
