@@ -35,6 +35,12 @@ pub trait Integratable: Object {
     /// Writes `j = Lᵀ·u`: the generalized impulse of a change of `u`.
     fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]);
 
+    /// Writes the change of the state's momentum for a change `du` of whitened velocity: `Lᵀ·du`, the default. Objects
+    /// whose cache has more than their own inertia, for the time of one step, override it.
+    fn momentum_change(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        self.mul_lt(cache, du, dp);
+    }
+
     /// Returns the mass of a part as a point at its origin, kg: gravity, energy and momentum of the
     /// provided methods. 0 by default.
     fn part_mass(&self, part: usize) -> f64 {
@@ -235,7 +241,7 @@ impl dyn Integratable + '_ {
     /// [`whiten_change`](Self::whiten_change).
     pub(crate) fn unwhiten_change(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
         match self.momentum_kind() {
-            MomentumKind::Conjugate => self.mul_lt(cache, du, dp),
+            MomentumKind::Conjugate => self.momentum_change(cache, du, dp),
             MomentumKind::Velocity => self.solve_l(cache, du, dp),
         }
     }

@@ -33,3 +33,4 @@ pub(crate) use body::check_shape_name;
 pub use error::BodyError;
 pub use locked::LockedAxes;
 pub(crate) use state::{orientation, vec3};
+pub(crate) use turning::resisting;

@@ -18,11 +18,43 @@ use nalgebra::{ComplexField, Translation3, Unit};
 use tumble_collide::{ContactMode, Mat3, Pose, Quat, Shape, Vec3};
 
 /// Blocks of the maps at one orientation.
-struct BodyCache {
+pub(super) struct BodyCache {
     /// Angular block of `L⁻ᵀ`: `I^{-½}·Rᵀ`, or that of the free axes.
     solve_lt: Mat3,
     /// Angular block of `Lᵀ`: `R·I^½`, or that of the free axes.
     mul_lt: Mat3,
+    /// Of a body that resists turning in this step, whose maps are those of `I + added`.
+    pub(super) resistance: Option<Box<Resistance>>,
+}
+
+/// What resists turning in a step (`step/turning.rs`): the state still holds the momentum of the body's own inertia `I`.
+pub(super) struct Resistance {
+    /// kg·m², body axes.
+    added: Mat3,
+    /// From angular momentum to whitened velocity, `L·I⁻¹`.
+    from_momentum: Mat3,
+    /// From a change of whitened velocity to one of angular momentum, `I·L⁻¹`.
+    to_momentum: Mat3,
+}
+
+impl Resistance {
+    pub fn new(added: Mat3) -> Resistance {
+        Resistance { added, from_momentum: Mat3::identity(), to_momentum: Mat3::identity() }
+    }
+}
+
+impl BodyCache {
+    /// Replaces the maps of an inertia, world axes, in an orientation `r` by those of `inertia + added`.
+    fn add_resistance(&mut self, inertia: &Mat3, r: &Mat3) {
+        let Some(resistance) = &mut self.resistance else { return };
+        let whole = inertia + r * resistance.added * r.transpose();
+        let Some(factor) = whole.cholesky() else { return self.resistance = None };
+        let lower = factor.l();
+        let Some(inverse) = lower.try_inverse() else { return self.resistance = None };
+        resistance.from_momentum = lower.transpose() * (self.solve_lt.transpose() * self.solve_lt);
+        resistance.to_momentum = inertia * inverse.transpose();
+        (self.solve_lt, self.mul_lt) = (inverse, lower);
+    }
 }
 
 impl RigidBody {
@@ -45,7 +77,7 @@ impl RigidBody {
     }
 
     /// Returns the inertia in world axes.
-    fn world_inertia(&self, q: &Quat) -> Mat3 {
+    pub(super) fn world_inertia(&self, q: &Quat) -> Mat3 {
         let r = q.to_rotation_matrix().into_inner();
         r * self.inertia.tensor * r.transpose()
     }
@@ -119,7 +151,8 @@ impl Object for RigidBody {
     }
 
     fn new_cache(&self) -> Cache {
-        Cache::new(BodyCache { solve_lt: self.inertia.inverse_root, mul_lt: self.inertia.root })
+        let (solve_lt, mul_lt) = (self.inertia.inverse_root, self.inertia.root);
+        Cache::new(BodyCache { solve_lt, mul_lt, resistance: None })
     }
 
     fn refresh(&self, x: &[f64], cache: &mut Cache, part_states: &mut [PartState]) {
@@ -144,6 +177,9 @@ impl Object for RigidBody {
             part_state.bias_acceleration = omega.cross(&omega.cross(&arm));
         } else {
             part_state.bias_acceleration = Vec3::zeros();
+        }
+        if cache.resistance.is_some() {
+            cache.add_resistance(&self.world_inertia(&q), &r);
         }
     }
 
@@ -339,7 +375,8 @@ impl Integratable for RigidBody {
     fn whitened_velocity(&self, cache: &mut Cache, x: &[f64], u: &mut [f64]) {
         let cache: &mut BodyCache = cache.get();
         let linear = (vec3(&x[7..]) / self.root_mass).component_mul(&self.locked.free_translation());
-        write6(u, &(cache.solve_lt * vec3(&x[10..])), &linear);
+        let angular = cache.resistance.as_ref().map_or(&cache.solve_lt, |resistance| &resistance.from_momentum);
+        write6(u, &(angular * vec3(&x[10..])), &linear);
     }
 
     fn jacobian(&self, _cache: &mut Cache, at: &PartPoint, j: &mut [f64]) {
@@ -402,6 +439,14 @@ impl Integratable for RigidBody {
             &(cache.mul_lt * vec3(u)),
             &(self.root_mass * vec3(&u[3..])).component_mul(&self.locked.free_translation()),
         );
+    }
+
+    fn momentum_change(&self, cache: &mut Cache, du: &[f64], dp: &mut [f64]) {
+        self.mul_lt(cache, du, dp);
+        let cache: &mut BodyCache = cache.get();
+        if let Some(resistance) = &cache.resistance {
+            dp[..3].copy_from_slice((resistance.to_momentum * vec3(du)).as_slice());
+        }
     }
 
     fn may_sleep(&self) -> bool {

@@ -363,7 +363,7 @@ pub(super) fn middle(
     let aims = [kept(closer), kept(2.0 * closer)];
     let groups = onto_joints(core, &mut at, (&mut layout, &mut rows), (level, time), &aims[0])?;
     let mut far = unreachable(core, &groups);
-    if far.is_empty() && groups.iter().any(|g| g.direct() && unreachable_joints::weak(&rows, &g.rows)) {
+    if far.is_empty() && groups.iter().any(|g| g.direct() && !g.is_tree && unreachable_joints::weak(&rows, &g.rows)) {
         let (mut end_rows, mut end) = (Workspace::default(), core.moment());
         end.x.copy_from_slice(&at.x);
         advance(core, &mut end, ahead);

@@ -14,6 +14,7 @@ mod impact;
 mod islands;
 mod moment;
 mod patch;
+mod resistance;
 mod slide_end;
 mod solves;
 mod time_stepping;
@@ -26,6 +27,7 @@ pub(crate) use budget::WorkMeter;
 pub(crate) use contacts::Workspace;
 pub(crate) use moment::Moment;
 pub(crate) use patch::PatchMoment;
+pub(crate) use resistance::ResistingBodies;
 pub use time_stepping::TimeStepping;
 pub(crate) use turning::{Attempt, HeldDivision, LargestTurn, add_stiffness, rate_squared};
 
@@ -44,6 +46,11 @@ pub trait Stepper: Send + Sync {
     fn undivided_step(&self, settings: &Settings) -> Option<f64> {
         let _ = settings;
         None
+    }
+    /// Returns whether rigid bodies may resist turning in its sub-steps, with an inertia that joint forces raise. False by
+    /// default.
+    fn resists_turning(&self) -> bool {
+        false
     }
     /// Returns an independent copy.
     fn fork(&self) -> Box<dyn Stepper>;

@@ -129,6 +129,10 @@ impl Stepper for TimeStepping {
         Some(settings.dt / f64::from(settings.substeps))
     }
 
+    fn resists_turning(&self) -> bool {
+        true
+    }
+
     fn fork(&self) -> Box<dyn Stepper> {
         Box::<TimeStepping>::default()
     }
@@ -140,7 +144,9 @@ impl TimeStepping {
         (core.implicit, core.by_impulses) = (true, true);
         core.meter.start_substep(core.state.time, h);
         let mut middle = core.moment();
+        core.resist_turning(&mut middle, h);
         self.advance(core, &mut middle, h)?;
+        core.stop_resisting(&mut middle);
         core.moments.push(middle);
         core.finish_substep(h)?;
         self.separate_at_end(core, h)

@@ -29,6 +29,7 @@
 //! | `F` | a force of the last sub-step without impacts; N, world axes |
 
 use super::Stepper;
+use super::resistance::STEADY;
 use crate::constraint::loop_joint::LoopJoint;
 use crate::object::part_state::PointLoad;
 use crate::world::{Core, StepError};
@@ -39,19 +40,42 @@ use tumble_collide::{Mat3, Vec3};
 const MAX_DIVISION: u32 = 128;
 /// A division that is found again is exceeded by at most this factor: forces differ a little from those
 /// of the coarser steps that it was computed from.
-const MARGIN: f64 = 1.5;
+pub(super) const MARGIN: f64 = 1.5;
 /// Time for which a division is held, s.
 const HOLD: f64 = 1.0;
 /// Forces are those of a jerk if a division raises the turn in the undivided sub-step by more than this.
 const JERK: f64 = 2.0;
 
-/// The largest turn of a frame.
+/// Number of parts that a sub-step is divided into at most for bodies that can resist turning: those that then still
+/// turn too far do (`step/resistance.rs`).
+const RESISTING_DIVISION: u32 = 4;
+
+/// The largest turn of a frame that is not implicit, and that of bodies that can resist.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LargestTurn {
     /// rad.
     turn: f64,
     place: usize,
     part: usize,
+    /// Turn of what cannot be implicit, rad.
+    inherent: f64,
+    /// Turn of bodies that can resist by all forces of joints, rad.
+    resistible: f64,
+    /// Turn of bodies that resisted by what their stiffness has grown, rad.
+    missed: f64,
+}
+
+impl LargestTurn {
+    fn raise(&mut self, turn: f64, place: usize, part: usize) {
+        if turn > self.turn {
+            (self.turn, self.place, self.part) = (turn, place, part);
+        }
+    }
+
+    /// Returns the turn for which a frame of `division` parts is divided, rad, if bodies resist as they can.
+    fn with_resistance(&self, division: u32, most: f64) -> f64 {
+        self.inherent.max(self.resistible.min(most * f64::from(RESISTING_DIVISION) / f64::from(division)))
+    }
 }
 
 /// How often a frame was taken, with the turn in an undivided sub-step before, rad.
@@ -77,11 +101,13 @@ pub(crate) fn rate_squared(a: &Mat3) -> f64 {
 }
 
 impl Core {
-    /// Measures the turns in a sub-step of `h` seconds that is finished.
-    pub(crate) fn measure_turns(&mut self, h: f64) {
+    /// Measures the turns in a sub-step of `h` seconds that is finished, or, `ahead`, in the first one of a frame.
+    pub(crate) fn measure_turns(&mut self, h: f64, ahead: bool) {
         let loads = self.joint_loads();
         let (gravity, table, states) = (self.settings.gravity, &self.table, &self.state.objects);
         let (derived, largest) = (&mut self.derived, &mut self.largest_turn);
+        let (resisting, division, most) = (&mut self.resisting, self.division, self.settings.max_turn);
+        resisting.start_measuring();
         let mut rest = &loads[..];
         for entry in table.with(states).iter() {
             rest = &rest[rest.partition_point(|(place, _)| *place < entry.place)..];
@@ -90,11 +116,17 @@ impl Core {
             rest = after;
             let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { continue };
             let parts = &derived.part_states[entry.state_range.parts.clone()];
-            let own = own.iter().map(|(_, load)| load);
-            let (part, rate) = body.turning_rate(&mut derived.caches[entry.place], parts, &gravity, &mut own.copied());
-            if h * rate > largest.turn {
-                *largest = LargestTurn { turn: h * rate, place: entry.place, part };
+            let mut own = own.iter().map(|(_, load)| *load);
+            if let Some(turns) = resisting.measure(&entry, &parts[0], &mut own, (h, division, most, ahead)) {
+                largest.resistible = largest.resistible.max(turns.whole);
+                largest.inherent = largest.inherent.max(turns.inherent);
+                largest.missed = largest.missed.max(turns.missed);
+                largest.raise(turns.explicit, entry.place, 0);
+                continue;
             }
+            let (part, rate) = body.turning_rate(&mut derived.caches[entry.place], parts, &gravity, &mut own);
+            largest.inherent = largest.inherent.max(h * rate);
+            largest.raise(h * rate, entry.place, part);
         }
         self.report.max_turn = largest.turn;
     }
@@ -118,9 +150,11 @@ impl Core {
     /// is held.
     pub(crate) fn divide_ahead(&mut self, stepper: &dyn Stepper) {
         (self.division, self.attempt, self.largest_turn) = (1, Attempt::First, LargestTurn::default());
+        self.resisting.start_frame(stepper.resists_turning());
         if let Some(h) = stepper.undivided_step(&self.settings) {
-            self.measure_turns(h);
-            self.divide_to(self.largest_turn.turn);
+            self.measure_turns(h, true);
+            self.resisting.keep_first();
+            self.divide_to(self.largest_turn.with_resistance(1, self.settings.max_turn));
             self.division = self.division.max(self.state.held_division.at(self.state.time));
         }
     }
@@ -133,8 +167,18 @@ impl Core {
     /// [`StepError::Turn`] if no admissible division is fine enough, unless a joint is out of reach, which the
     /// report says.
     pub(crate) fn divide_again(&mut self, stepper: &dyn Stepper, time: f64) -> Result<bool, StepError> {
-        let (LargestTurn { turn, place, part }, most) = (self.largest_turn, self.settings.max_turn);
-        let undivided = f64::from(self.division) * turn;
+        let (largest, most) = (self.largest_turn, self.settings.max_turn);
+        let LargestTurn { turn, place, part, .. } = largest;
+        let resisted = largest.with_resistance(self.division, most);
+        if largest.missed > STEADY || (turn > resisted.max(MARGIN * most) && self.resisting.could_help()) {
+            let undivided = f64::from(self.division) * turn.max(largest.resistible);
+            let resist = self.resisting.try_again();
+            self.divide_to(if resist { f64::from(self.division) * resisted } else { undivided });
+            self.attempt = Attempt::Finer(undivided);
+            self.resisting.start_again();
+            return Ok(true);
+        }
+        let undivided = f64::from(self.division) * turn.max(resisted);
         let admissible = most * f64::from(MAX_DIVISION);
         let jerk = match self.attempt {
             Attempt::First => false,
@@ -144,8 +188,9 @@ impl Core {
         if stepper.undivided_step(&self.settings).is_none() || jerk {
             return Ok(false);
         }
-        if turn <= if self.division > 1 { MARGIN * most } else { most } {
-            self.state.held_division.hold((undivided / most).ceil() as u32, time);
+        if turn.max(resisted) <= if self.division > 1 { MARGIN * most } else { most } {
+            let needed = if self.resisting.is_steady() { resisted } else { turn.max(resisted) };
+            self.state.held_division.hold((f64::from(self.division) * needed / most).ceil() as u32, time);
             return Ok(false);
         }
         match self.attempt {
@@ -162,13 +207,14 @@ impl Core {
                 return Err(StepError::Turn { object, part, turn, most, time });
             }
         }
+        self.resisting.start_again();
         Ok(true)
     }
 
     /// Divides the sub-steps so that a turn in the undivided one, rad, is admissible in each part.
     fn divide_to(&mut self, undivided: f64) {
         let parts = (undivided / self.settings.max_turn).ceil();
-        self.division = parts.clamp(1.0, f64::from(MAX_DIVISION)) as u32;
+        self.division = self.division.max(parts.clamp(1.0, f64::from(MAX_DIVISION)) as u32);
     }
 }
 

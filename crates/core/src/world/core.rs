@@ -16,7 +16,7 @@ use crate::rigid::RigidBody;
 use crate::sensor::loads::FrameLoads;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
-use crate::step::{Attempt, LargestTurn, Moment, WorkMeter};
+use crate::step::{Attempt, LargestTurn, Moment, ResistingBodies, WorkMeter};
 use crate::threads::Threads;
 use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
@@ -223,6 +223,8 @@ pub struct Core {
     pub(crate) attempt: Attempt,
     /// Largest turn of the frame.
     pub(crate) largest_turn: LargestTurn,
+    /// Bodies that resist turning.
+    pub(crate) resisting: ResistingBodies,
     /// Working memory of frame states.
     pub(super) frame_numbers: Vec<f64>,
     /// Branches of the step that [`linearize`](crate::linearize) holds.
@@ -286,6 +288,7 @@ impl Core {
             division: 1,
             attempt: Attempt::First,
             largest_turn: LargestTurn::default(),
+            resisting: ResistingBodies::default(),
             frame_numbers: Vec::new(),
             branches: Branches::default(),
         }
@@ -556,7 +559,7 @@ impl Core {
         if let Some(bad) = first_object(&self.threads, self.objects(), |e| !fine(e)) {
             return Err(self.not_finite(bad.name, "its state"));
         }
-        self.measure_turns(h);
+        self.measure_turns(h, false);
         Ok(())
     }
 

@@ -195,3 +195,101 @@ fn what_no_division_can_hold_is_an_error_that_names_the_part() {
     let wrong = chain.world.settings().with_max_turn(0.0);
     assert!(chain.world.set_settings(wrong).unwrap_err().to_string().contains("max turn"));
 }
+
+/// Two light bars between a pin and a load: their common pin moves to the side with `ω² = T·l/I`, `I` about an end,, and in steps of `h` with
+/// `tan(½ω'h) = ½ωh`, as the implicit midpoint rule has it.
+#[test]
+fn a_taut_bar_turns_as_the_implicit_midpoint_rule_says() {
+    let (mass, load, h) = (0.04, 1000.0, 1.0 / 960.0);
+    let mut world = Chain::start("time_stepping", 4.0 * h, 1.0);
+    let tilt = 1e-5f64;
+    let bar = |world: &mut World, from: Vec3, to: Vec3, before: Option<(ObjectId, usize)>| {
+        let turn = (from - to).x.atan2((from - to).z);
+        let body = RigidBody::new(Shape::cuboid(Vec3::new(0.02, 0.02, LENGTH)).unwrap()).with_mass(mass);
+        let id = world.add(body.with_pose(Pose::new(0.5 * (from + to), Vec3::new(0.0, turn, 0.0)))).unwrap();
+        world.set_collidable(id, false).unwrap();
+        let name = format!("pin of {id:?}");
+        world.add(LoopJoint::revolute_at(name, world, Some((id, 0)), before, from, Vec3::y()).unwrap()).unwrap();
+        id
+    };
+    let middle = LENGTH * Vec3::new(tilt.sin(), 0.0, -tilt.cos());
+    let end = Vec3::new(0.0, 0.0, 2.0 * middle.z);
+    let first = bar(&mut world, Vec3::zeros(), middle, None);
+    let second = bar(&mut world, middle, end, Some((first, 0)));
+    let cube = RigidBody::new(Shape::cuboid(Vec3::repeat(LOAD)).unwrap()).with_mass(load);
+    let cube = world.add(cube.with_pose(Pose::new(end, Vec3::zeros()))).unwrap();
+    world.set_collidable(cube, false).unwrap();
+    let pin = LoopJoint::revolute_at("load", &world, Some((cube, 0)), Some((second, 0)), end, Vec3::y()).unwrap();
+    world.add(pin).unwrap();
+    let angle = |world: &World| world.body(first).unwrap().position().x / (0.5 * LENGTH);
+    // the first frames know no forces of joints and are divided, for a second
+    (0..300).for_each(|_| world.step().map(|_| ()).unwrap());
+    let mut angles = vec![angle(&world)];
+    for _ in 0..2000 {
+        assert_eq!(world.step().unwrap().substeps, 4, "frame {}", angles.len());
+        angles.push(angle(&world));
+    }
+    let about_end = mass * (LENGTH * LENGTH / 3.0 + 0.02 * 0.02 / 12.0);
+    let omega = ((load + mass) * G * LENGTH / about_end).sqrt();
+    assert!(omega * h > 1.9, "{}", omega * h);
+    let in_frame = 4.0 * 2.0 * (0.5 * omega * h).atan();
+    for (k, of) in angles.windows(3).enumerate() {
+        let expected = 2.0 * in_frame.cos() * of[1] - of[0];
+        assert!((of[2] - expected).abs() < 2e-3 * tilt, "frame {k}: {} for {expected}", of[2]);
+    }
+    // joints are closed to 1e-9 m, by which the load does as much work as that of 1 % of the oscillation
+    let largest = |part: &[f64]| part.iter().fold(0.0f64, |most, angle| most.max(angle.abs()));
+    let [before, after] = [largest(&angles[..500]), largest(&angles[1500..])];
+    println!("{before} rad, then {after} rad");
+    assert!((after / before - 1.0).abs() < 0.05, "{before} then {after}");
+}
+
+/// The load swings by a meter as with steps that resolve its chain, to 1e-7 m.
+#[test]
+fn a_load_on_a_taut_chain_moves_as_if_the_chain_were_resolved() {
+    let end = |rate: f64| {
+        let mut chain = Chain::of_bodies(Chain::start("time_stepping", 1.0 / rate, 1.0), 3, 1e4, 0.6);
+        let (change, gap, substeps) = chain.swing(1.0);
+        assert!(gap < 1e-8 && change < 1e-6, "{rate} Hz: {gap} m, {change}");
+        (chain.world.part_state(chain.parts[3].0, 0).unwrap().pose.translation.vector, substeps)
+    };
+    let (resolved, substeps) = end(7680.0);
+    assert_eq!(substeps, 7680);
+    for (rate, most) in [(60.0, 1e-7), (120.0, 4e-8), (240.0, 1e-8)] {
+        let (place, substeps) = end(rate);
+        assert!(f64::from(substeps) <= 4.0 * rate, "{rate} Hz: {substeps}");
+        let error = (place - resolved).norm();
+        println!("{rate} Hz: {error:.1e} m, {substeps} sub-steps");
+        assert!(error < most, "{rate} Hz: {error:e} m");
+    }
+}
+
+/// A rope of 20 links with 1800 times their mass at its end.
+fn rope(dt: f64, level: bool) -> Chain {
+    let world = Chain::start("time_stepping", dt, 1.0);
+    let mut chain = Chain::of_bodies(world, 20, 1800.0, if level { 0.5 * std::f64::consts::PI } else { 0.0 });
+    chain.fall = 1800.0 * G * LENGTH * 20.0;
+    chain
+}
+
+#[test]
+fn a_rope_with_a_heavy_end_hangs_at_the_cost_of_four_sub_steps() {
+    let mut chain = rope(1.0 / 60.0, false);
+    let before = chain.world.part_state(chain.parts[20].0, 0).unwrap().pose.translation.vector;
+    let (change, gap, substeps) = chain.swing(2.0);
+    let after = chain.world.part_state(chain.parts[20].0, 0).unwrap().pose.translation.vector;
+    assert!((after - before).norm() < 1e-9 && change < 1e-12 && gap < 1e-10, "{after}, {change}, {gap}");
+    assert_eq!(substeps, 480);
+}
+
+/// The responses along a straight rope differ by more than a thousand, but a tree of free bodies can always be closed.
+#[test]
+fn a_rope_that_a_load_pulls_straight_is_not_out_of_reach() {
+    let mut chain = rope(1.0 / 960.0, true);
+    for _ in 0..480 {
+        let report = chain.world.step().unwrap();
+        assert_eq!(report.unreachable_joint, None);
+    }
+    let (change, gap, _) = chain.swing(0.25);
+    assert!(change < 1e-6 && gap < 1e-8, "{change}, {gap}");
+}

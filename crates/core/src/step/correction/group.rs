@@ -22,9 +22,12 @@
 
 use super::super::{Workspace, unreachable_joints};
 use super::errors::{Errors, position_tolerance};
+use crate::constraint::rows::Side;
+use crate::rigid::RigidBody;
 use crate::solver::MAX_DIRECT_ROWS;
 use crate::world::Core;
 use crate::world::view::{Entry, Objects};
+use smallvec::SmallVec;
 use std::ops::Range;
 
 /// Maximum number of rounds at the end of a step.
@@ -51,6 +54,9 @@ pub(super) struct Group {
     pub blocks: Vec<u32>,
     /// Its joints, as indices of targets.
     joints: Vec<u32>,
+    /// Whether its joints can be closed whatever else holds: they are a tree of free rigid bodies, joined to the ground at one
+    /// place at most.
+    pub is_tree: bool,
     /// Ranges of the objects in the state, and in generalized velocities.
     pub ranges: Vec<(Range<usize>, Range<usize>)>,
     /// Largest error of position and of velocity, as multiples of the tolerance.
@@ -93,7 +99,7 @@ impl Group {
     /// Returns the groups of the rows that `errors` measures. At the end of a step they start with
     /// the rows of the step, unless they contain a limit.
     pub fn all(core: &Core, work: &mut Workspace, errors: &Errors, at_end: bool) -> Vec<Group> {
-        let (contacts, Workspace { rows, islands, .. }) = (work.contact_constraints.len(), work);
+        let (contacts, Workspace { rows, islands, first, .. }) = (work.contact_constraints.len(), work);
         islands.build(rows, |b| b >= contacts && errors.measures(b - contacts));
         let entries = by_start(core.objects());
         let group = |blocks: &[u32]| {
@@ -102,6 +108,15 @@ impl Group {
             starts.sort_unstable();
             starts.dedup();
             let ranges = starts.iter().filter_map(|u| entry_at(&entries, *u));
+            let free = ranges.clone().all(|entry| {
+                let any: &dyn std::any::Any = entry.object;
+                any.downcast_ref::<RigidBody>().is_some_and(RigidBody::is_free)
+            });
+            let is_tree = free && {
+                let owner = |b: u32| first.partition_point(|&from| from + contacts <= b as usize);
+                let joints = blocks.chunk_by(|&a, &b| owner(a) == owner(b));
+                is_tree(&starts, joints.map(|joint| joint.iter().map(|&b| rows.blocks[b as usize].sides())))
+            };
             let large = blocks.len() > MAX_DIRECT_ROWS;
             let rows: Vec<u32> = blocks.iter().map(|b| b - contacts as u32).collect();
             let (inertias, held): (Vec<u32>, Vec<u32>) = rows.iter().partition(|&&i| errors.is_inertial(i as usize));
@@ -121,6 +136,7 @@ impl Group {
                 positions_first: false,
                 damping: 1.0,
                 relaxes: at_end,
+                is_tree,
                 rows,
                 joints,
             }
@@ -175,7 +191,10 @@ impl Group {
     /// be closed.
     pub fn is_open(&self, core: &Core) -> bool {
         let tolerance = core.settings.contact_tolerance;
-        !self.joints.is_empty() && self.direct() && self.left.0 > tolerance / position_tolerance(tolerance)
+        !self.joints.is_empty()
+            && self.direct()
+            && !self.is_tree
+            && self.left.0 > tolerance / position_tolerance(tolerance)
     }
 
     /// Returns whether its joints are closed, in position and velocity.
@@ -199,4 +218,33 @@ impl Group {
     pub fn largest(&self, of_rows: &[f64]) -> f64 {
         self.rows.iter().fold(0.0, |worst, &i| worst.max(of_rows[i as usize].abs()))
     }
+}
+
+/// Returns whether joints, each given by the sides of its rows, connect objects without a cycle. Objects are named by the start of
+/// their velocities, sorted in `starts`; a row with one side joins to the ground, which is one object.
+fn is_tree<'r>(starts: &[u32], joints: impl Iterator<Item = impl Iterator<Item = &'r [Side]>>) -> bool {
+    let ground = starts.len();
+    let mut parents: Vec<usize> = (0..=ground).collect();
+    let root = |parents: &[usize], mut k: usize| {
+        while parents[k] != k {
+            k = parents[k];
+        }
+        k
+    };
+    for joint in joints {
+        let mut ends = SmallVec::<[usize; 4]>::new();
+        for sides in joint {
+            ends.extend(sides.iter().filter_map(|side| starts.binary_search(&side.u).ok()));
+            ends.extend((sides.len() < 2).then_some(ground));
+        }
+        ends.sort_unstable();
+        ends.dedup();
+        let [a, b] = ends[..] else { return false };
+        let [a, b] = [a, b].map(|end| root(&parents, end));
+        if a == b {
+            return false;
+        }
+        parents[a] = b;
+    }
+    true
 }

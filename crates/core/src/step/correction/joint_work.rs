@@ -24,7 +24,7 @@
 //! |---|---|
 //! | `λ`, `w₀`, `w₁` | multipliers of the step, velocities of rows before and after |
 //! | `x*`, `p*`; `x₁`, `p₁` | state before, after the correction |
-//! | `T`, `F` | kinetic energy, forces |
+//! | `T`, `F` | kinetic energy, forces. Bodies that resist turning have an inertia `ΔI` more in this step (`step/resistance.rs`): `½(ω₀ + ω₁)·ΔI·(ω₁ − ω₀)` is taken from `W` |
 //! | `v`, `|v|²` | velocity, twice its energy. In a group that nothing joins to the ground both are those relative to the rigid motion that has its momenta, which stay as they are |
 //!
 //! One factor for all velocities keeps joints closed in velocity. In a mechanism of one degree of freedom it is the only
@@ -126,6 +126,17 @@ pub(super) fn advance(
                 }
             }
             kinetic += body.energy(&end.x[entry.state_range.x.clone()], &Vec3::zeros()).kinetic;
+            if let Some(added) = core.resisting.added(entry.place) {
+                // the kinetic energy of the state is that without it
+                let turned = acting.derived.part_states[entry.state_range.parts.start].pose.rotation;
+                let [first, last] = [&before, &after].map(|u| {
+                    let mut velocity = [0.0; 6];
+                    body.solve_l(cache, &u[v.clone()], &mut velocity);
+                    Vec3::from_column_slice(&velocity[..3])
+                });
+                let [sum, change] = [first + last, last - first].map(|omega| turned.inverse() * omega);
+                kinetic += 0.5 * sum.dot(&(added * change));
+            }
         }
         let (mut done, mut turned) = (0.0, 0.0);
         for (_, block) in rows() {
