@@ -49,15 +49,15 @@ macro_rules! table {
 table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "8f01ac981dbda08f", "35727a0afefe7dab";
-    billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "b642e6824b667564";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5c90c707c04aaf44";
-    chain_time_stepping: "chain", TimeStepping, "bbceab106cefb143", "017c9dc6970cad04";
+    billiards_backtracking: "billiards", Backtracking, "cf76b8d3c6f31f60", "1537a074384f8337";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "930c5c5acab66f4a";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5c96819c22735ec6";
+    chain_time_stepping: "chain", TimeStepping, "a88220838a0cc2eb", "50bf194f3b66f688";
     chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
-    falling_time_stepping: "falling", TimeStepping, "229ea17898f61b35", "f0dfabe735f7a2cc";
+    falling_time_stepping: "falling", TimeStepping, "445334e847d6ff0e", "ac07159eaec076fc";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "d13f869a296e4847", "aa894d9cb8e3cf07";
+    falling_backtracking: "falling", Backtracking, "281bd4f708f2b79a", "7c5342e954559936";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -66,7 +66,7 @@ table! {
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
     robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "f3d2566244a33458";
     robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c82ac5e456d8f016";
-    skeleton_time_stepping: "skeleton", TimeStepping, "6a25cfcb500df86a", "55fd41b6b46116e2";
+    skeleton_time_stepping: "skeleton", TimeStepping, "2c778fda0f9c5a03", "5ebca02f30ba702e";
     skeleton_backtracking: "skeleton", Backtracking, "ca2fb3da08c0a460", "09b1ab65352375a7";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
@@ -76,7 +76,7 @@ table! {
 table! {
     [0.5, 2.0];
     ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "31502da018d5f877";
-    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "50a39ed5ff84a6aa";
+    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "4b6806a3ed046400";
     bird_time_stepping: "bird", TimeStepping, "3d85f0ea42bb77db", "878264a194147426";
     bird_backtracking: "bird", Backtracking, "1ce1e6f8cf5eb25d", "dcde02ee42013d37";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
@@ -85,17 +85,17 @@ table! {
     campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "5b143390393d7fa5";
-    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "34fcf1baf6fda38f";
+    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "b84fb5c5ad4c1869";
+    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "b2c605a5701bdb65";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "087f72ba625bf535";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
     arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "da88b3337864b3ba";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "5a92b18e025f41b9";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "b3ea27ad35754290";
-    mechanism_time_stepping: "mechanism", TimeStepping, "9495d2cfa387718e", "83d988890d7050c9";
-    dominoes_time_stepping: "dominoes", TimeStepping, "5a5e6140fbf8e47e", "74fe06e90e02a20a";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "3d1c6e780840feba";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "e5d1e0756ac695ee";
+    mechanism_time_stepping: "mechanism", TimeStepping, "439037c3fa7400c0", "f0b75853a7699303";
+    dominoes_time_stepping: "dominoes", TimeStepping, "fc37f235c8a49790", "737df8775c8f83fd";
 }
 
 table! {
