@@ -23,11 +23,11 @@ pub(super) struct BodyCache {
     solve_lt: Mat3,
     /// Angular block of `Lᵀ`: `R·I^½`, or that of the free axes.
     mul_lt: Mat3,
-    /// Of a body that resists turning in this step, whose maps are those of `I + added`.
+    /// The resistance of a body to turning in this step: its maps are those of `I + added`.
     pub(super) resistance: Option<Box<Resistance>>,
 }
 
-/// What resists turning in a step (`step/turning.rs`): the state still holds the momentum of the body's own inertia `I`.
+/// The resistance to turning in a step (`step/resistance.rs`): the state still holds the momentum of the body's own inertia `I`.
 pub(super) struct Resistance {
     /// kg·m², body axes.
     added: Mat3,

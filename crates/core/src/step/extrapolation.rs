@@ -13,6 +13,7 @@
 //! tolerance, and are of lower order by themselves. A sub-step that ends with an event in its second run, or in which
 //! other contacts have a force in the second half, is not combined: then its halves stand.
 //!
+//! Heaps are left out with integrators other than `dormand_prince` ([`MOST_CONTACTS`]).
 //! Worlds in which other objects than rigid bodies move are left out: their coordinates are not known to be a linear space.
 
 use super::Workspace;
@@ -30,6 +31,8 @@ use tumble_collide::Vec3;
 
 /// Angle by which a contact turns in a sub-step that is extrapolated, rad: with `dormand_prince`, and with other integrators.
 const TURN: (f64, f64) = (1e-6, 2e-3);
+/// Largest number of touching contacts with other integrators: in a heap most second runs end with an event, and are in vain.
+const MOST_CONTACTS: usize = 8;
 /// Largest error of a sub-step with `dormand_prince`, in integrator tolerances.
 pub(super) const SAFETY: f64 = 10.0;
 
@@ -69,7 +72,8 @@ pub(super) fn is_needed(core: &Core, work: &Workspace, roles: &[Role], h: f64) -
     let least = if exact { TURN.0 } else { TURN.1 };
     let turns = |(constraint, _): (&ContactConstraint, &Role)| h * turning(core, constraint) > least;
     let touching = || work.contact_constraints.iter().zip(roles).filter(|(_, role)| role.touching);
-    if core.settings.solver_settings.budget.is_some() || !touching().any(turns) {
+    let heap = !exact && touching().count() > MOST_CONTACTS;
+    if core.settings.solver_settings.budget.is_some() || heap || !touching().any(turns) {
         return false;
     }
     core.objects().iter().filter(|e| e.moves()).all(|e| {

@@ -64,7 +64,7 @@ pub(crate) struct ResistingBodies {
     attempts: u32,
     /// Turn in an undivided sub-step by the change of stiffness since the frame began, rad.
     change: f64,
-    /// What was added to the inertia in the last sub-step, kg·m², body axes, and its length, s.
+    /// The part of the inertia that was added in the last sub-step, kg·m², body axes, and its length, s.
     added: Vec<(usize, Mat3)>,
     length: f64,
 }

@@ -117,7 +117,9 @@ impl Core {
             let Some(body) = entry.object.integratable().filter(|_| entry.moves()) else { continue };
             let parts = &derived.part_states[entry.state_range.parts.clone()];
             let mut own = own.iter().map(|(_, load)| *load);
-            if let Some(turns) = resisting.measure(&entry, &parts[0], &mut own, (h, division, most, ahead)) {
+            let turns =
+                parts.first().and_then(|state| resisting.measure(&entry, state, &mut own, (h, division, most, ahead)));
+            if let Some(turns) = turns {
                 largest.resistible = largest.resistible.max(turns.whole);
                 largest.inherent = largest.inherent.max(turns.inherent);
                 largest.missed = largest.missed.max(turns.missed);

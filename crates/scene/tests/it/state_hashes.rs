@@ -49,15 +49,15 @@ macro_rules! table {
 table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "8f01ac981dbda08f", "35727a0afefe7dab";
-    billiards_backtracking: "billiards", Backtracking, "cf76b8d3c6f31f60", "1537a074384f8337";
+    billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
     bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "930c5c5acab66f4a";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "5c96819c22735ec6";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "4aaba541f979a1b7";
     chain_time_stepping: "chain", TimeStepping, "a88220838a0cc2eb", "50bf194f3b66f688";
     chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
     falling_time_stepping: "falling", TimeStepping, "445334e847d6ff0e", "ac07159eaec076fc";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "281bd4f708f2b79a", "7c5342e954559936";
+    falling_backtracking: "falling", Backtracking, "cafae29e45444c7b", "855b1f5f3db52def";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -86,7 +86,7 @@ table! {
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
     marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "b84fb5c5ad4c1869";
-    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "b2c605a5701bdb65";
+    marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "65dc5e3b02c312fa";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "087f72ba625bf535";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
