@@ -71,7 +71,7 @@ pub struct StepReport {
     pub relaxations: u64,
     /// Deepest penetration that the narrow phase found, m.
     pub max_penetration: f64,
-    /// Largest angle by which the forces of joints turn a part back and forth in a sub-step, rad
+    /// Largest angle by which the forces of joints turn a part back and forth in a sub-step, rad, without those that it resists
     /// ([`Settings::max_turn`](crate::Settings::max_turn)).
     pub max_turn: f64,
     /// The unreachable joint with the largest error; `None` if all joints could be closed.

@@ -72,7 +72,8 @@ pub struct Settings {
     pub recovery_speed: f64,
     /// Largest angle by which the forces of joints may turn a part back and forth in a sub-step, rad, 0.01
     /// to 1e6; 1 by default. A frame in which a part turns further is taken again in sub-steps that
-    /// are short enough: chains of light links with a heavy end need it (`step/turning.rs`).
+    /// are short enough: chains of light links with a heavy end need it (`step/turning.rs`). Of free rigid bodies those under steady
+    /// forces resist instead, beyond four sub-steps in `time_stepping` (`step/resistance.rs`).
     pub max_turn: f64,
     /// When islands fall asleep; `None`: never.
     pub sleep: Option<Sleep>,
