@@ -10,9 +10,9 @@
 //! ```
 //!
 //! So bodies respond to the impulses of the step with the inertia `I + ¼h²·K⁺`, and joints are closed as always. The rule is stable for
-//! any `K⁺ ≥ 0`, keeps the energy of an oscillation, and is of second order with any `K⁺`, as `ω₁ − ω₀` is of the order `h`. Bodies
-//! that turn no further than `Settings::max_turn` respond with `I` alone. `K` is that of the last sub-step;
-//! what it lacks of the one that was found counts as the turn of the body.
+//! any constant `K⁺ ≥ 0`, keeps the energy of an oscillation, and is of second order with any `K⁺`, as `ω₁ − ω₀` is of the order `h`. Bodies
+//! that turn no further than `Settings::max_turn` respond with `I` alone. `K` is that of the last sub-step. If it changes by more than
+//! [`STEADY`] allows, the frame is taken again, at last without resistance and in more sub-steps.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -21,14 +21,12 @@
 //! | `ω₀`, `ω₁` | angular velocity at the ends of the step |
 
 use super::Moment;
+use super::turning::MARGIN;
 use crate::object::part_state::{PartState, PointLoad};
 use crate::rigid::{RigidBody, resisting};
 use crate::world::Core;
 use crate::world::view::Entry;
 use tumble_collide::Mat3;
-
-/// A body turns further than the setting by this factor before it resists: what is divided for it stays explicit.
-const MARGIN: f64 = super::turning::MARGIN;
 
 /// Maximum number of attempts at a frame with other resistances alone.
 const MAX_ATTEMPTS: u32 = 3;

@@ -1,7 +1,8 @@
 //! How far the forces of joints turn bodies within a sub-step, and the division of a frame by it.
 //!
 //! Rows hold in the pose in which they were made. A pin that carries a force `F` at an arm `r` turns its
-//! body back as a pendulum's weight does, and this geometric stiffness is explicit in both steppers. Its
+//! body back as a pendulum's weight does, and this geometric stiffness is explicit in both steppers, except
+//! for rigid bodies that resist it (`step/resistance.rs`). Its
 //! oscillation must be resolved: a chain of light links with a heavy end otherwise gains energy and comes
 //! apart, though every solve is exact.
 //!
