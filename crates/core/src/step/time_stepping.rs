@@ -262,7 +262,8 @@ impl TimeStepping {
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
-            if constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
+            let stops = self.candidates.get(i).is_some_and(|candidate| candidate.stops);
+            if !stops && constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
                 moving::add_motion(work, i, &free, h);
             }
         }
