@@ -68,7 +68,7 @@ fn stops(core: &Core, constraint: &ContactConstraint, (v, gain): (f64, f64), spe
         moving_pair(core.objects(), &core.owners, &core.derived.part_states, sides, constraint.plane.as_deref())
             .is_some_and(|pair| pair.shapes.iter().all(|shape| shape.has_convex_parts()))
     };
-    std::env::var("OLD").is_err() && speed > (GRAZING * -v).max(-gain) && pair()
+    speed > (GRAZING * -v).max(-gain) && pair()
 }
 
 impl TimeStepping {
