@@ -34,9 +34,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Newton rounds that make the known solution exact.
 const ROUNDS: usize = 8;
-/// Rounds with the derivative at the known solution, for displaced rows: the first one makes the derivative right, the others
-/// the truncation of differences small.
-const CHORDS: usize = 3;
+/// Least number of rounds with the derivative at the known solution, for displaced rows, and most as long as they converge:
+/// the first one makes the derivative right, the others the truncation of differences small.
+const CHORDS: (usize, usize) = (3, 6);
 /// Singular values below this fraction of the largest belong to redundant rows.
 const RANK: f64 = 1e-10;
 /// Redundant multipliers that change no row velocity by more than this, in units of their own, leave velocities determined.
@@ -142,7 +142,15 @@ impl RowSolver for HeldSolver {
         let Tape { known, next, switched, .. } = &mut *tape;
         let known = &known[*next - 1];
         let mut next = known.lambda.clone();
-        (0..CHORDS).for_each(|_| next = problem.step(&known.active, &next, &known.inverse));
+        let mut last = f64::INFINITY;
+        for round in 0..CHORDS.1 {
+            let after = problem.step(&known.active, &next, &known.inverse);
+            let change = after.iter().zip(&next).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            if round >= CHORDS.0 && (change.is_nan() || change >= last) {
+                break;
+            }
+            (next, last) = (after, change);
+        }
         problem.check(&known.active, &next, switched);
         problem.write(&next, lambda, du);
         SolveReport { iterations: 1, converged: true, ray: false, relaxations: 0 }

@@ -326,7 +326,13 @@ impl Backtracking {
                     (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
                 let rest_speed =
                     (rebound / constraint.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
-                Candidate { takes_part: role.touching, rest_speed, restitution: constraint.restitution, crowd: false }
+                Candidate {
+                    takes_part: role.touching,
+                    stops: false,
+                    rest_speed,
+                    restitution: constraint.restitution,
+                    crowd: false,
+                }
             })
             .collect();
         let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);

@@ -33,6 +33,8 @@ use crate::world::Core;
 pub(crate) struct Candidate {
     /// Whether the contact may take part.
     pub takes_part: bool,
+    /// Whether its surfaces meet at the time of the impacts and do not part again: its restitution is 0.
+    pub stops: bool,
     /// Approach speed up to which it rests instead of bouncing, m/s.
     pub rest_speed: f64,
     /// Coefficient of restitution of the pair.

@@ -233,12 +233,12 @@ impl TimeStepping {
         keep.resize(work.rows.blocks.len(), true);
         for (i, constraint) in work.contact_constraints.iter().enumerate() {
             let block = &work.rows.blocks[i];
-            let (row, struck) = (block.row as usize, self.impact[block.row as usize] > 0.0);
+            let (row, candidate) = (block.row as usize, self.candidates.get(i));
+            let struck = self.impact[row] > 0.0 || candidate.is_some_and(|candidate| candidate.stops);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
             let rate = moving::gap_rate(work, i, &free, (first[row], h)).0;
             let closed = h * s * 0.5 * (first[row] + rate);
             let (gap, left) = (constraint.gap_of_row() + closed, h * (1.0 - s).max(1e-9));
-            let candidate = self.candidates.get(i);
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
             let crowd = candidate.is_some_and(|candidate| candidate.crowd);
             let apart = !struck && (crowd || constraint.contact.gap > core.settings.drift_tolerance);
@@ -262,7 +262,8 @@ impl TimeStepping {
         }
         for i in 0..work.contact_constraints.len() {
             let constraint = &work.contact_constraints[i];
-            if constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
+            let stops = self.candidates.get(i).is_some_and(|candidate| candidate.stops);
+            if !stops && constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
                 moving::add_motion(work, i, &free, h);
             }
         }

@@ -6,6 +6,9 @@
 //! contacts are stopped by the solve of all contacts, like those that close later in the step, and
 //! rebound at its end, all at once and with no more energy than that solve took from them.
 //!
+//! A contact without restitution has no reflection. It stops in the solve of all contacts, with the rows of the time at
+//! which it closes, so that spin and angular momentum are right.
+//!
 //! A contact that carried a force in the last sub-step bounces only if it approaches faster than the
 //! forces of a step change the speed of either body along its normal: what is below is load that
 //! comes and goes, not an impact.
@@ -13,8 +16,9 @@
 use super::moving::FreeTerms;
 use super::{Buffers, TimeStepping, in_the_middle, moving};
 use crate::constraint::rows::Side;
+use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::PredictionMode;
-use crate::contact::time_of_impact::time_to_close;
+use crate::contact::time_of_impact::{moving_pair, time_to_close};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
 use crate::step::Moment;
@@ -30,6 +34,9 @@ const IMPACT_PASSES: u32 = 50;
 /// end of the step, all at once.
 const CROWD: usize = 100;
 
+/// A contact without restitution that has lost more than this share of its approach speed when it closes grazes.
+const GRAZING: f64 = 0.5;
+
 /// A gap (m) in free motion, with its rate and the change of the rate, per step.
 struct Approach {
     gap: f64,
@@ -42,6 +49,26 @@ impl Approach {
     fn gap_at(&self, fraction: f64) -> f64 {
         self.gap + fraction * (self.rate + 0.5 * fraction * self.gain)
     }
+}
+
+/// Returns whether a contact may have a time of impact: it bounces, or it is open and not of a link, on which all impulses act
+/// in the middle of the step.
+fn may_strike(core: &Core, constraint: &ContactConstraint) -> bool {
+    let entry = |part: u32| core.objects().at(core.owners[part as usize].place as usize);
+    let of_link = || [constraint.a, constraint.b].iter().any(|part| in_the_middle(&entry(*part)));
+    constraint.restitution > 0.0 || constraint.gap_of_row() > core.settings.contact_tolerance && !of_link()
+}
+
+/// Returns whether an open contact without restitution, which approaches at `speed` when it closes, stops at that time.
+/// What grazes, or is only brought together by the forces of the step, is left to its gap, and so are concave meshes, whose
+/// contacts are not found again at that time.
+fn stops(core: &Core, constraint: &ContactConstraint, (v, gain): (f64, f64), speed: f64) -> bool {
+    let sides = [constraint.a, constraint.b];
+    let pair = || {
+        moving_pair(core.objects(), &core.owners, &core.derived.part_states, sides, constraint.plane.as_deref())
+            .is_some_and(|pair| pair.shapes.iter().all(|shape| shape.has_convex_parts()))
+    };
+    speed > (GRAZING * -v).max(-gain) && pair()
 }
 
 impl TimeStepping {
@@ -63,7 +90,7 @@ impl TimeStepping {
         self.impact_fraction.resize(core.dof, -1.0);
         zero(&mut self.impact, work.rows.len);
         self.candidates.clear();
-        if work.contact_constraints.iter().all(|t| t.restitution <= 0.0) {
+        if !work.contact_constraints.iter().any(|constraint| may_strike(core, constraint)) {
             return Ok(());
         }
         let (before, gain) = (&mut self.buffers.before, &mut self.buffers.gain);
@@ -84,17 +111,18 @@ impl TimeStepping {
                 -dv
             };
             let rest_speed = pressed.max(impact::SLOWEST_BOUNCE);
-            let impact_fraction = if constraint.restitution > 0.0 {
-                let gain = dv + h * rate;
-                time_to_close(gap / h, v, gain).filter(|s| *s <= 1.0 && -(v + s * gain) > rest_speed)
-            } else {
-                None
-            };
+            let gain = dv + h * rate;
+            let time = time_to_close(gap / h, v, gain).filter(|s| *s <= 1.0 && may_strike(core, constraint));
+            let impact_fraction = time.filter(|s| {
+                let speed = -(v + s * gain);
+                speed > rest_speed && (constraint.restitution > 0.0 || stops(core, constraint, (v, gain), speed))
+            });
             impact_fractions.push(impact_fraction);
             rates.push(rate);
             approaches.push(Approach { gap, rate: h * v, gain: h * (dv + h * rate) });
             self.candidates.push(Candidate {
                 takes_part: constraint.contact.gap <= core.settings.drift_tolerance,
+                stops: false,
                 rest_speed,
                 restitution: constraint.restitution,
                 crowd: false,
@@ -186,13 +214,16 @@ impl TimeStepping {
             }
         }
         let first = |i: usize| {
-            let sides = work.rows.blocks[i].sides();
+            let times = work.rows.blocks[i].sides().iter().map(|side| self.impact_fraction[side.u as usize]);
+            let stays = self.candidates[i].restitution <= 0.0 && approaches[i].rate < 0.0;
+            let closes = impact_fractions[i].or(stays.then_some(f64::INFINITY));
             let now = |s: f64, first: f64| s <= first + 1e-9 || approaches[i].gap_at(first) <= tolerance;
-            impact_fractions[i].is_some_and(|s| sides.iter().all(|side| now(s, self.impact_fraction[side.u as usize])))
+            closes.is_some_and(|s| times.clone().all(|first| first >= 0.0 && now(s, first)))
         };
         let strikes: Vec<bool> = (0..impact_fractions.len()).map(first).collect();
         for (candidate, strikes) in self.candidates.iter_mut().zip(&strikes) {
             candidate.takes_part |= strikes;
+            candidate.stops = *strikes && candidate.restitution <= 0.0;
         }
         let (candidates, contact_constraints) = (&mut self.candidates, work.contact_constraints.len());
         work.islands.build(&work.rows, |b| b >= contact_constraints || candidates[b].takes_part);

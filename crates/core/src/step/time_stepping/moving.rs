@@ -8,14 +8,14 @@ use crate::contact::time_of_impact::moving_pair;
 use crate::step::contacts::{free_motion_change, gyroscopic};
 use crate::step::{Moment, Workspace};
 use crate::world::Core;
-use tumble_collide::Vec3;
+use tumble_collide::{Shape, Vec3};
 
 /// Moves the contacts that touch to `time` seconds after the start of the step. Others stay, so that
 /// what passes them keeps its distance; those that may bounce get their rates.
 pub(super) fn move_contacts(core: &Core, contacts: &mut [ContactConstraint], time: f64) {
     for constraint in contacts {
         let touches = touches(core, constraint, time);
-        let may_bounce = constraint.restitution > 0.0 && constraint.found_at == 0.0;
+        let may_bounce = constraint.found_at == 0.0;
         if touches || may_bounce {
             let before = constraint.frame;
             move_in_step(core, constraint, time);
@@ -106,7 +106,10 @@ pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, (fraction, rate
         }
         let (sides, plane) = ([constraint.a, constraint.b], constraint.plane.clone());
         let pair = moving_pair(core.objects(), &core.owners, part_states, sides, plane.as_deref());
-        if let Some(pair) = pair.filter(|pair| !pair.shapes.iter().any(|shape| shape.has_tree())) {
+        let stops = constraint.restitution <= 0.0;
+        let convex = |shape: &Shape| matches!(shape, Shape::Mesh(_)) && shape.has_convex_parts();
+        let again = |shape: &&Shape| !shape.has_tree() || stops && convex(shape);
+        if let Some(pair) = pair.filter(|pair| pair.shapes.iter().all(again)) {
             let reach = pair.reach(&constraint.contact.point, s * h);
             let margin = constraint.contact.gap.abs() + reach + core.settings.drift_tolerance;
             pair.contacts_after(s * h, margin, &mut found);

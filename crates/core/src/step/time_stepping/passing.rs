@@ -39,6 +39,7 @@ impl TimeStepping {
         filed.extend(found.into_iter().map(|constraint| Filed {
             candidate: (self.candidates.len() == old).then_some(Candidate {
                 takes_part: false,
+                stops: false,
                 rest_speed: impact::SLOWEST_BOUNCE,
                 restitution: constraint.restitution,
                 crowd: false,
