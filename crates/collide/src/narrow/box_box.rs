@@ -79,10 +79,12 @@ fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
     let start = out.len();
     let least = face_manifold(f, &face, margin, out);
     if least > (greatest + bias).min(margin) || face.separation < greatest - bias {
-        out.truncate(start);
         match box_closest::closest(f) {
-            Some(contact) if contact.gap <= margin => push_with_face(f, contact, &face, margin, out),
-            _ => {}
+            Some(contact) if contact.gap <= margin => {
+                out.insert(start, contact);
+                keep_following(f, start, out);
+            }
+            _ => out.truncate(start),
         }
     }
 }
@@ -90,9 +92,16 @@ fn in_frame_of_a(f: &BoxPair, margin: f64, out: &mut Vec<Contact>) {
 /// Appends a contact and those points of a face manifold that may follow it: tilted boxes meet at
 /// one point, and turn until they lie flat, within one step if they are fast.
 fn push_with_face(f: &BoxPair, contact: Contact, face: &FaceAxis, margin: f64, out: &mut Vec<Contact>) {
-    out.push(contact);
     let start = out.len();
+    out.push(contact);
     face_manifold(f, face, margin, out);
+    keep_following(f, start, out);
+}
+
+/// Keeps the contact at `start` and those of the following points of a face manifold that may follow it.
+fn keep_following(f: &BoxPair, start: usize, out: &mut Vec<Contact>) {
+    let contact = out[start];
+    let start = start + 1;
     let same_place = SAME_PLACE * f.a.min().min(f.b.min());
     let mut n = start;
     for i in start..out.len() {

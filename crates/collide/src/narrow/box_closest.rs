@@ -8,11 +8,17 @@ use super::segment::segment_box;
 use super::sphere::{clamp, region};
 use crate::{Contact, NormalFrom, Vec3};
 
+/// An edge further away than the nearest one by this factor is not compared, whatever the rounding.
+const FURTHER: f64 = 1.0 + 1e-6;
+
 /// Returns the contact in A's frame; `None` if the boxes touch or overlap.
 pub(super) fn closest(f: &BoxPair) -> Option<Contact> {
     let mut best: Option<Contact> = None;
     for axis in 0..3 {
         for corner in 0..4_u64 {
+            if best.is_some_and(|b| least_distance(f, axis, corner) > FURTHER * b.gap) {
+                continue;
+            }
             let contact = edge_to_box(f, axis, corner)?;
             if best.is_none_or(|b| contact.gap < b.gap - 1e-12 * f.a.max()) {
                 best = Some(contact);
@@ -22,14 +28,27 @@ pub(super) fn closest(f: &BoxPair) -> Option<Contact> {
     best
 }
 
-/// Returns the contact of B's edge along `axis`; the bits of `corner` are its signs on the other
-/// two axes.
-fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
+/// Returns the middle of B's edge along `axis`, and half of it, in A's frame; the bits of `corner` are its signs on the
+/// other two axes.
+fn edge_of_b(f: &BoxPair, axis: usize, corner: u64) -> (Vec3, Vec3) {
     let (k1, k2) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut middle = Vec3::zeros();
     middle[k1] = if corner & 1 == 1 { f.b[k1] } else { -f.b[k1] };
     middle[k2] = if corner & 2 == 2 { f.b[k2] } else { -f.b[k2] };
-    let (c, u) = (f.t + f.r * middle, f.r.column(axis) * f.b[axis]);
+    (f.t + f.r * middle, f.r.column(axis) * f.b[axis])
+}
+
+/// Returns the distance of an edge's bounding box from A, a lower bound of the edge's distance.
+fn least_distance(f: &BoxPair, axis: usize, corner: u64) -> f64 {
+    let (c, u) = edge_of_b(f, axis, corner);
+    (c.abs() - u.abs() - f.a).map(|d| d.max(0.0)).norm()
+}
+
+/// Returns the contact of B's edge along `axis`; the bits of `corner` are its signs on the other
+/// two axes.
+fn edge_to_box(f: &BoxPair, axis: usize, corner: u64) -> Option<Contact> {
+    let (k1, k2) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (c, u) = edge_of_b(f, axis, corner);
     let s = segment_box(&c, &u, &f.a);
     let p = c + u * s;
     let q = clamp(&p, &f.a);

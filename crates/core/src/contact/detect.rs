@@ -5,12 +5,12 @@ use crate::contact::internal_edges::{InternalEdges, Surroundings};
 use crate::contact::laws::ContactLaws;
 use crate::contact::motion::Moved;
 use crate::contact::own_tests::OwnTests;
-use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, PredictionMode};
+use crate::contact::pair::{CachedContacts, KnownContacts, MotionBounds, NarrowPhaseCache, PairQuery, Reach};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::surfaces::PairSurfaces;
 use crate::contact::time_of_impact::MovingPair;
 use crate::object::FilteredPart;
-use crate::object::collidable::ContactFrame;
+use crate::object::collidable::{Collidable, ContactFrame};
 use crate::object::part_state::PartState;
 use crate::settings::Settings;
 use crate::threads::Threads;
@@ -144,10 +144,10 @@ pub(crate) struct Detector<'a> {
 
 impl Detector<'_> {
     /// Finds all contacts whose gap is at most the distance that the pair may close within
-    /// `horizon` seconds, plus the drift tolerance; without those at internal edges of flush bodies.
-    pub fn detect(&mut self, horizon: f64, prediction: PredictionMode, out: &mut Vec<ContactConstraint>) {
+    /// `reach`, plus twice the drift tolerance; without those at internal edges of flush bodies.
+    pub fn detect(&mut self, reach: Reach, out: &mut Vec<ContactConstraint>) {
         out.clear();
-        self.gather(horizon);
+        self.gather(reach);
         let mut pairs = std::mem::take(&mut self.scratch.pairs);
         self.broad.pairs(&mut pairs);
         self.order_by_part(&mut pairs);
@@ -163,8 +163,8 @@ impl Detector<'_> {
             pair_materials: self.pair_materials,
             proxies: &self.scratch.proxies,
             motion_bounds: &self.scratch.motion_bounds,
-            horizon,
-            prediction,
+            near: 2.0 * self.settings.drift_tolerance + reach.distance,
+            reach,
         };
         // the first piece writes to the results at once
         std::mem::swap(out, &mut found[0].contact_constraints);
@@ -188,22 +188,22 @@ impl Detector<'_> {
         }
         self.scratch.found = found;
         self.scratch.pairs = pairs;
-        let (bounds, near) = (&self.scratch.part_bounds, 2.0 * self.settings.drift_tolerance);
+        let (bounds, near) = (&self.scratch.part_bounds, narrow.near);
         let motion = |part: u32| bounds[part as usize].as_ref().map_or(MotionBounds::default(), |bounds| bounds.motion);
         let around = Surroundings {
             objects: self.objects,
             owners: self.owners,
             part_states: self.part_states,
             drift_tolerance: self.settings.drift_tolerance,
-            margin: &|a, b| near + motion(a).between(&motion(b), prediction),
+            margin: &|a, b| near + motion(a).between(&motion(b), reach.prediction),
         };
         self.scratch.internal_edges.remove(&around, out);
     }
 
     /// Puts one box per collidable part, around its motion within the horizon, into the broad
     /// phase.
-    fn gather(&mut self, horizon: f64) {
-        if !self.bound_parts(horizon) {
+    fn gather(&mut self, reach: Reach) {
+        if !self.bound_parts(reach) {
             return self.move_boxes();
         }
         let s = &mut *self.scratch;
@@ -252,7 +252,7 @@ impl Detector<'_> {
 
     /// Computes the bounds of all walked parts: those of settled objects stay. Returns whether any part
     /// has gained or lost its box.
-    fn bound_parts(&mut self, horizon: f64) -> bool {
+    fn bound_parts(&mut self, reach: Reach) -> bool {
         let Detector { objects, owners, part_states, settings, threads, .. } = *self;
         let bounds_of = |index: usize| {
             let Owner { place, part, .. } = owners[index];
@@ -262,11 +262,11 @@ impl Detector<'_> {
             let (shape, part_state) = (collidable.shape(part as usize)?, &part_states[index]);
             let tight = shape.aabb(&part_state.pose);
             let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
-            let motion = MotionBounds::new(part_state, shape.bounding_radius(), around, horizon);
+            let motion = MotionBounds::new(part_state, shape.bounding_radius(), around, reach.horizon);
             Some(PartBounds {
                 key: [entry.serial, part],
                 motion,
-                swept: motion.swept(&tight, settings.drift_tolerance),
+                swept: motion.swept(&tight, settings.drift_tolerance + 0.5 * reach.distance),
                 moving: entry.status.mode != Mode::Static && !entry.asleep,
             })
         };
@@ -320,9 +320,9 @@ struct NarrowPhase<'a> {
     /// Rows of the part table, and bounds on their motion.
     proxies: &'a [u32],
     motion_bounds: &'a [MotionBounds],
-    /// s.
-    horizon: f64,
-    prediction: PredictionMode,
+    /// Distance that counts as near, m.
+    near: f64,
+    reach: Reach<'a>,
 }
 
 impl NarrowPhase<'_> {
@@ -341,21 +341,23 @@ impl NarrowPhase<'_> {
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
         let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
+        let key = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
+        let moves = |entry: &Entry, body: &dyn Collidable, part| entry.moves() && body.part_moves(part);
+        let is_known = self.reach.known.binary_search(&key).is_ok();
+        if is_known && moves(&entry_a, body_a, part_a) && moves(&entry_b, body_b, part_b) {
+            return;
+        }
         let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
         let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
-        let surfaces = PairSurfaces {
-            settings: self.settings,
-            pair_materials: self.pair_materials,
-            part_states: [state_a, state_b],
-            whole: [(owner_a.id, part_a, body_a.material(part_a)), (owner_b.id, part_b, body_b.material(part_b))],
-            of_shapes: [body_a.shape_materials(part_a), body_b.shape_materials(part_b)],
+        let vary = !body_a.shape_materials(part_a).is_empty() || !body_b.shape_materials(part_b).is_empty();
+        let ignored = || {
+            let [of_a, of_b] = [body_a.material(part_a), body_b.material(part_b)];
+            self.pair_materials.ignores((owner_a.id, part_a, &of_a), (owner_b.id, part_b, &of_b))
         };
-        let vary = surfaces.vary();
-        if !vary && surfaces.ignores([0; 2]) {
+        if !vary && !self.pair_materials.is_empty() && ignored() {
             return;
         }
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
-        let near = 2.0 * self.settings.drift_tolerance;
         let pair = PairQuery {
             parts: MovingPair {
                 mode,
@@ -366,14 +368,25 @@ impl NarrowPhase<'_> {
                 skipped: &[],
             },
             motion_bounds: [self.motion_bounds[i], self.motion_bounds[j]],
-            near,
-            prediction: self.prediction,
+            near: self.near,
+            prediction: self.reach.prediction,
         };
         if pair.is_expensive() && pair.is_separated() {
             return;
         }
         let Found { contact_constraints: out, needs_wake, cached, contacts: found } = results;
-        let time = pair.contacts([a, b], self.horizon, (known, cached), found);
+        let time = pair.contacts([a, b], self.reach.horizon, (known, cached), found);
+        if found.is_empty() {
+            return;
+        }
+        let [of_a, of_b] = [body_a.material(part_a), body_b.material(part_b)];
+        let surfaces = PairSurfaces {
+            settings: self.settings,
+            pair_materials: self.pair_materials,
+            part_states: [state_a, state_b],
+            whole: [(owner_a.id, part_a, &of_a), (owner_b.id, part_b, &of_b)],
+            of_shapes: [body_a.shape_materials(part_a), body_b.shape_materials(part_b)],
+        };
         if vary {
             found.retain(|contact| !surfaces.ignores(contact.shapes));
         }
@@ -385,7 +398,6 @@ impl NarrowPhase<'_> {
         }
         let mut shapes = [0; 2];
         let mut surface = surfaces.laws(shapes);
-        let pair = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let mut frame = ContactFrame { point: Vec3::zeros(), axes: [Vec3::zeros(); 3] };
         out.extend(found.iter().map(|contact| {
             let other = vary && contact.shapes != shapes;
@@ -408,7 +420,7 @@ impl NarrowPhase<'_> {
                 surface_velocity: surface.surface_velocity,
                 laws: surface.laws.clone(),
                 plane: None,
-                key: ContactKey { pair, feature: contact.feature },
+                key: ContactKey { pair: key, feature: contact.feature },
             }
         }));
         if time > 0.0 {

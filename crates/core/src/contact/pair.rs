@@ -30,6 +30,30 @@ pub(crate) enum PredictionMode {
     Each,
 }
 
+/// Which contacts a detection finds.
+#[derive(Clone, Copy)]
+pub(crate) struct Reach<'a> {
+    /// Time within which the parts may meet, s.
+    pub horizon: f64,
+    pub prediction: PredictionMode,
+    /// Distance beside that of their motion, m.
+    pub distance: f64,
+    /// Serials and parts of pairs that are left out if both parts move, ascending.
+    pub known: &'a [[u32; 4]],
+}
+
+impl Reach<'_> {
+    /// Returns the reach of parts that move for `horizon` seconds.
+    pub fn in_time(horizon: f64, prediction: PredictionMode) -> Reach<'static> {
+        Reach { horizon, prediction, distance: 0.0, known: &[] }
+    }
+
+    /// Returns the reach of parts at their places, m.
+    pub fn in_place(distance: f64) -> Reach<'static> {
+        Reach { horizon: 0.0, prediction: PredictionMode::Each, distance, known: &[] }
+    }
+}
+
 /// Bounds on the motion of a part within the horizon.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct MotionBounds {

@@ -56,7 +56,7 @@ impl PairMaterial {
 }
 
 /// A part that is in contact, with its material.
-pub(crate) type Surface = (ObjectId, usize, Material);
+pub(crate) type Surface<'a> = (ObjectId, usize, &'a Material);
 
 /// The chosen pairs of a world. Which side is named first makes no difference.
 #[derive(Clone, Debug, Default)]
@@ -89,8 +89,8 @@ impl PairMaterials {
     /// constant the entry that names the pair most closely, or else the combination rule.
     pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
         let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
-        let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(&a.2), of(&b.2));
-        let larger = |of: fn(&Material) -> f64| of(&a.2).max(of(&b.2));
+        let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(a.2), of(b.2));
+        let larger = |of: fn(&Material) -> f64| of(a.2).max(of(b.2));
         let at_rest = || rule(settings.combine_friction, Material::friction_at_rest);
         Material {
             restitution: chosen.restitution.unwrap_or_else(|| rule(settings.combine_restitution, |m| m.restitution)),
@@ -107,7 +107,12 @@ impl PairMaterials {
 
     /// Returns whether a chosen pair keeps two parts from colliding.
     pub fn ignores(&self, a: Surface, b: Surface) -> bool {
-        !self.entries.is_empty() && self.of(a, b).collides == Some(false)
+        !self.is_empty() && self.of(a, b).collides == Some(false)
+    }
+
+    /// Returns whether no pair has constants of its own.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
     }
 
     /// A part goes before its object, and that before its material; between entries that name a

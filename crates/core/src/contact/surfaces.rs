@@ -13,7 +13,7 @@ pub(crate) struct PairSurfaces<'a> {
     pub pair_materials: &'a PairMaterials,
     pub part_states: [&'a PartState; 2],
     /// Those of the parts.
-    pub whole: [Surface; 2],
+    pub whole: [Surface<'a>; 2],
     /// Constants of single shapes of each part, ascending.
     pub of_shapes: [&'a [(usize, Material)]; 2],
 }
@@ -27,12 +27,7 @@ pub(crate) struct SurfaceLaws {
     pub laws: Option<Box<ContactLaws>>,
 }
 
-impl PairSurfaces<'_> {
-    /// Returns whether the constants depend on the shapes that touch.
-    pub fn vary(&self) -> bool {
-        self.of_shapes.iter().any(|own| !own.is_empty())
-    }
-
+impl<'a> PairSurfaces<'a> {
     /// Returns whether a chosen pair keeps two shapes from colliding.
     pub fn ignores(&self, shapes: [u32; 2]) -> bool {
         let [a, b] = self.at(shapes);
@@ -48,16 +43,16 @@ impl PairSurfaces<'_> {
             friction: material.friction,
             restitution: material.restitution,
             surface_velocity: velocity(state_a, a) - velocity(state_b, b),
-            laws: ContactLaws::of_pair(&material, [(state_a, &a.2), (state_b, &b.2)]),
+            laws: ContactLaws::of_pair(&material, [(state_a, a.2), (state_b, b.2)]),
         }
     }
 
     /// Returns the surfaces of two shapes.
-    fn at(&self, shapes: [u32; 2]) -> [Surface; 2] {
+    fn at(&self, shapes: [u32; 2]) -> [Surface<'a>; 2] {
         [0, 1].map(|k| {
             let ((id, part, material), own) = (self.whole[k], self.of_shapes[k]);
             let found = own.binary_search_by_key(&(shapes[k] as usize), |(shape, _)| *shape);
-            (id, part, found.map_or(material, |at| own[at].1))
+            (id, part, found.map_or(material, |at| &own[at].1))
         })
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct ContactBlock {
     /// `K⁻¹`, absent if a direction has no response.
     inverse: Option<Symmetric3>,
     /// The same of a contact that responds in a plane.
-    in_plane: Option<InPlane>,
+    in_plane: Option<Box<InPlane>>,
     /// `1/λ_max(K_tt)`; 0 if no tangent has a response.
     rho: f64,
     /// Whether `μ·|k_nt|` is close to `k_nn`.
@@ -66,7 +66,7 @@ impl ContactBlock {
         let rho = if mu > 0.0 && largest > f64::MIN_POSITIVE { 1.0 / largest } else { 0.0 };
         let coupled = mu * mu * (k.m10 * k.m10 + k.m20 * k.m20) > COUPLED * COUPLED * k.m00 * k.m00;
         let inverse = if mu > 0.0 { k.inverse() } else { None };
-        let in_plane = if inverse.is_none() && rho > 0.0 { InPlane::new(&k, largest) } else { None };
+        let in_plane = if inverse.is_none() && rho > 0.0 { InPlane::new(&k, largest).map(Box::new) } else { None };
         ContactBlock { mu, k, inverse, in_plane, rho, coupled }
     }
 
@@ -88,7 +88,7 @@ impl ContactBlock {
                 return (full, delta);
             }
         }
-        let stuck = self.in_plane.as_ref().and_then(|plane| plane.stick(&self.k, old, w));
+        let stuck = self.in_plane.as_deref().and_then(|plane| plane.stick(&self.k, old, w));
         let within = |full: &[f64; 3]| {
             full[0] >= 0.0 && full[1] * full[1] + full[2] * full[2] <= (self.mu * full[0]) * (self.mu * full[0])
         };

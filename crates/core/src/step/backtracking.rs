@@ -43,7 +43,7 @@ use super::{StepContext, Stepper, TimeStepping, Workspace, extrapolation};
 use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
-use crate::contact::pair::PredictionMode;
+use crate::contact::pair::{PredictionMode, Reach};
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
 use crate::sensor::loads::SubstepForces;
@@ -241,7 +241,7 @@ impl Backtracking {
     /// Corrects overlap beyond the contact tolerance, then computes contacts, rows and smooth
     /// accelerations at the present state.
     fn gather(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
-        detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
+        detect(core, None, Reach::in_time(left, PredictionMode::Relative), &mut self.work.contact_constraints);
         let soft = Some(left);
         build_rows(core, None, &mut self.work, Level::Acceleration { h: left, soft }, 0.0)?;
         let soft = match core.settings.integrator {
@@ -265,10 +265,11 @@ impl Backtracking {
                 limits: Limits::Free,
                 recovery: core.settings.recovery_speed * left,
                 tolerance: 1e-2 * core.settings.contact_tolerance,
+                effort: 1,
             };
             correction::correct(core, None, &mut self.work, &mut self.probe, &options)?;
             core.integration().refresh();
-            detect(core, None, (left, PredictionMode::Relative), &mut self.work.contact_constraints);
+            detect(core, None, Reach::in_time(left, PredictionMode::Relative), &mut self.work.contact_constraints);
         }
         self.work.dp.resize(core.dof, 0.0);
         let time = core.state.time;
@@ -584,6 +585,7 @@ impl Backtracking {
             limits: Limits::Listed { limits: &self.held, reach: core.settings.drift_tolerance },
             recovery: core.settings.recovery_speed * left,
             tolerance: core.settings.contact_tolerance,
+            effort: 1,
         };
         correction::correct(core, None, &mut self.work, &mut self.probe, &options)
     }
@@ -645,7 +647,7 @@ impl Backtracking {
     /// as a try.
     fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
         core.report.tries += 1;
-        detect(core, None, (0.0, PredictionMode::Relative), &mut self.after);
+        detect(core, None, Reach::in_time(0.0, PredictionMode::Relative), &mut self.after);
         limits(&core.view(core.state.time + h), &mut self.limits_after)?;
         Ok(self.watch.margin(
             &self.work.contact_constraints,

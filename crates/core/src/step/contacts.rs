@@ -11,7 +11,7 @@ use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner};
 use crate::contact::laws::ContactLaws;
-use crate::contact::pair::PredictionMode;
+use crate::contact::pair::Reach;
 use crate::derived::{Cache, Derived};
 use crate::each_object::{Numbers, Own, each_object};
 use crate::integrators::context::free_motion;
@@ -93,14 +93,8 @@ pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepE
     Ok(())
 }
 
-/// Finds the contacts at `moment`, or else at the present, within reach of the next `horizon`
-/// seconds.
-pub(crate) fn detect(
-    core: &mut Core,
-    moment: Option<&Moment>,
-    (horizon, prediction): (f64, PredictionMode),
-    out: &mut Vec<ContactConstraint>,
-) {
+/// Finds the contacts within reach at `moment`, or else at the present.
+pub(crate) fn detect(core: &mut Core, moment: Option<&Moment>, reach: Reach, out: &mut Vec<ContactConstraint>) {
     let mut detector = Detector {
         objects: core.table.with(&core.state.objects),
         owners: &core.owners,
@@ -112,7 +106,7 @@ pub(crate) fn detect(
         threads: &core.threads,
         needs_wake: &mut core.needs_wake,
     };
-    detector.detect(horizon, prediction, out);
+    detector.detect(reach, out);
     let deepest = out.iter().map(|t| -t.contact.gap).fold(0.0, f64::max);
     core.report.max_penetration = core.report.max_penetration.max(deepest);
     core.report.contacts = out.len() as u32;

@@ -49,12 +49,13 @@ use super::warm_start::{row_starts, warm_start};
 use super::{Moment, StepContext, Stepper, Workspace};
 use crate::constraint::rows::RowSet;
 use crate::contact::detect::ContactConstraint;
-use crate::contact::pair::PredictionMode;
+use crate::contact::pair::{PredictionMode, Reach};
 use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::linearize::Switch;
 use crate::object::Level;
+use crate::object::part_state::PartState;
 use crate::sensor::loads::SubstepForces;
 use crate::settings::Settings;
 use crate::solver::SolverSettings;
@@ -71,6 +72,8 @@ pub struct TimeStepping {
     /// Contacts at the end of the step.
     end: Workspace,
     taken: Taken,
+    /// Part states before the last correction of overlap at the end.
+    before: Vec<PartState>,
     x0: Vec<f64>,
     /// Fraction of the step before the first impact, per coordinate; negative without an impact.
     impact_fraction: Vec<f64>,
@@ -156,7 +159,7 @@ impl TimeStepping {
     /// act.
     fn advance(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         self.smooth_forces(core, middle, h)?;
-        detect(core, None, (h, PredictionMode::Each), &mut self.work.contact_constraints);
+        detect(core, None, Reach::in_time(h, PredictionMode::Each), &mut self.work.contact_constraints);
         let parts = (&core.owners[..], &core.derived.part_states[..]);
         let (found, predicted) = (&mut self.work.contact_constraints, &mut self.buffers.predicted);
         time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, found, predicted);

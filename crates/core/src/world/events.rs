@@ -490,8 +490,9 @@ impl Core {
         let (FilteredPart { body: a, part: part_a, .. }, FilteredPart { body: b, part: part_b, .. }) =
             (sensor.side, other.side);
         let Some(shape) = other.side.sensed_by(&sensor.side, &trigger.class) else { return false };
-        let surface = |p: &SensedPart<'_>, material| (self.table.order[p.entry.place], p.side.part, material);
-        if self.pair_materials.ignores(surface(sensor, a.material(part_a)), surface(other, b.material(part_b))) {
+        let [sensor_id, other_id] = [&sensor.entry, &other.entry].map(|entry| self.table.order[entry.place]);
+        let [of_a, of_b] = [a.material(part_a), b.material(part_b)];
+        if self.pair_materials.ignores((sensor_id, part_a, &of_a), (other_id, part_b, &of_b)) {
             return false;
         }
         contacts.clear();

@@ -1,7 +1,7 @@
 //! Surface constants of chosen pairs.
 
 use super::{World, WorldError};
-use crate::contact::pair_material::{PairMaterial, PairSide, Surface};
+use crate::contact::pair_material::{PairMaterial, PairSide};
 use crate::object::Material;
 use crate::world::view::ObjectId;
 
@@ -42,13 +42,13 @@ impl World {
     pub fn pair_material(&self, a: (ObjectId, usize), b: (ObjectId, usize)) -> Result<Material, WorldError> {
         let in_order = self.part(a.0, a.1, &[])? <= self.part(b.0, b.1, &[])?;
         let (a, b) = if in_order { (a, b) } else { (b, a) };
-        let (a, b) = (self.surface(a), self.surface(b));
-        Ok(self.core.pair_materials.combine(&self.core.settings, a, b))
+        let [of_a, of_b] = [a, b].map(|side| self.material_of(side));
+        Ok(self.core.pair_materials.combine(&self.core.settings, (a.0, a.1, &of_a), (b.0, b.1, &of_b)))
     }
 
-    fn surface(&self, (id, part): (ObjectId, usize)) -> Surface {
+    fn material_of(&self, (id, part): (ObjectId, usize)) -> Material {
         let material = self.object(id).and_then(|o| o.collidable()).map(|c| c.material(part));
-        (id, part, material.unwrap_or_default())
+        material.unwrap_or_default()
     }
 
     fn check_side(&self, side: &PairSide) -> Result<(), WorldError> {

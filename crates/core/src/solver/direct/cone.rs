@@ -103,6 +103,7 @@ pub(super) fn largest_step(x: V3, d: V3) -> f64 {
 
 /// Returns the Euclidean projection of `x` onto the friction cone `{ |x_t| ≤ μ·x_n }`, and its
 /// derivative.
+#[inline(always)]
 pub(super) fn project(x: V3, mu: f64) -> (V3, M3) {
     let t = length(x[1], x[2]);
     if t <= mu * x[0] {

@@ -203,7 +203,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
     /// factorizations.
     pub fn inner(&mut self, tolerance: f64, factors: u32, cheap: bool) -> u32 {
         let (mut taken, mut failures, mut tried, mut work) = (0, 0, Vec::new(), Vec::new());
-        let mut size = self.evaluate(true);
+        let mut size = self.evaluate::<true>();
         while taken < factors.min(STEPS.1) && size * self.largest > tolerance {
             let System { island, structure, factor, .. } = &mut *self.system;
             if !factor.factor(structure, island, &self.gains) {
@@ -217,7 +217,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
             let lengths = |count: u32| (0..count).map(|k| 0.5_f64.powi(k as i32));
             let mut size_at = |t: f64| {
                 self.u.iter_mut().zip(tried.iter().zip(&step)).for_each(|(u, (from, s))| *u = from - t * s);
-                (self.evaluate(false), self.potential)
+                (self.evaluate::<false>(), self.potential)
             };
             let mut shorter = lengths(HALVINGS.0).find(|&t| size_at(t).0 < (1.0 - 1e-4 * t) * size);
             if shorter.is_none() && potential.is_finite() {
@@ -227,7 +227,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
                 self.u.iter_mut().zip(tried.iter().zip(&step)).for_each(|(u, (from, s))| *u = from - s);
                 failures += 1;
             }
-            let before = std::mem::replace(&mut size, self.evaluate(true));
+            let before = std::mem::replace(&mut size, self.evaluate::<true>());
             if failures > FAILURES || size.is_nan() || !cheap && size > PROGRESS * before {
                 break;
             }
@@ -236,7 +236,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
     }
 
     /// Writes `Π(…)`, `F`, the potential and, if asked for, the gains at `u`; returns the size of `F`.
-    fn evaluate(&mut self, with_gains: bool) -> f64 {
+    fn evaluate<const GAINS: bool>(&mut self) -> f64 {
         let island = &self.system.island;
         let still = STILL * island.fastest;
         self.gains.clear();
@@ -248,7 +248,7 @@ impl<'s, 'a> Proximal<'s, 'a> {
             let (next, gain) = trial(b, &self.center[b.range()], self.penalty, (w, held), still);
             self.projected[b.range()].copy_from_slice(&next[..b.rows]);
             island.push(b, &next.map(|x| -x)[..b.rows], &mut self.f);
-            if with_gains {
+            if GAINS {
                 self.gains.push(gain);
             }
             if held.is_some() {

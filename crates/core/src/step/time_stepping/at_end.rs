@@ -8,7 +8,11 @@
 //! ```text
 //! found where     r·|Δθ| > d   or   |x_1 − x_free| > d + h²·|a|           d: drift tolerance,  r: bounding radius
 //! goal            gap ≥ min(0, gap_0 + recovery)                          gap_0: deepest gap of the pair at the start
+//! contacts        gap ≤ max(10·d, 2·D)                                    D: deepest overlap
 //! ```
+//!
+//! A correction moves bodies by about the overlap that it takes away, so contacts further apart take no part. It ends when the
+//! rows say that nothing overlaps, and bodies have turned so little that the rows can be believed.
 //!
 //! Velocities stay, so the pair touches at the start of the next step, and meets there. The correction may raise bodies. A group
 //! that made energy in the step pays for it from its kinetic energy, with one factor for all its velocities:
@@ -19,9 +23,10 @@
 //! ```
 
 use super::TimeStepping;
-use super::lift::coordinates;
+use super::lift::{coordinates, coordinates_of};
+use crate::constraint::rows::Block;
 use crate::contact::detect::ContactConstraint;
-use crate::contact::pair::PredictionMode;
+use crate::contact::pair::Reach;
 use crate::contact::time_of_impact::pose_after_free_motion;
 use crate::linearize::Switch;
 use crate::object::Level;
@@ -33,7 +38,14 @@ use crate::world::{Core, StepError};
 use tumble_collide::Shape;
 
 /// Maximum number of corrections of overlap that the rows of the step do not see.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 2;
+/// Sweeps of one of them, in [`Settings::projection_sweeps`](crate::Settings): another sweep costs less than to find the contacts
+/// again.
+const EFFORT: u32 = 2;
+/// Distance within which a correction looks for contacts at first, in drift tolerances.
+const FIRST_REACH: f64 = 10.0;
+/// Least such distance in deepest overlaps: two bodies may be pushed towards each other, each as far.
+const PUSHED: f64 = 2.0;
 /// A budget that does not pay for as many sweeps leaves the overlap to the next step.
 const LEAST_SWEEPS: usize = 8;
 /// Energy below this fraction of a group's kinetic energy is rounding.
@@ -76,6 +88,7 @@ impl TimeStepping {
             limits: Limits::Violated,
             recovery: core.settings.recovery_speed * h,
             tolerance: core.settings.contact_tolerance,
+            effort: 1,
         };
         correction::correct(core, Some(middle), work, &mut self.probe, &options)?;
         self.buffers.moved.clone_from(&self.work.frictionless.du);
@@ -104,20 +117,18 @@ impl TimeStepping {
         if !core.branches.take(Switch::Overlap, None, self.strays(core, h)) {
             return Ok(());
         }
+        let tolerance = core.settings.drift_tolerance;
+        let mut reach = FIRST_REACH * tolerance;
         for _ in 0..ROUNDS {
-            let (report, deepest) = (core.report, core.settings.drift_tolerance);
-            detect(core, None, (0.0, PredictionMode::Each), &mut self.end.contact_constraints);
-            core.report = report;
-            self.allow_old_overlap(core.settings.recovery_speed * h);
-            let overlaps = self.end.contact_constraints.iter().any(|t| t.contact.gap < -deepest);
-            if !core.branches.take(Switch::Overlap, None, overlaps) {
+            let deepest = self.find_at_end(core, h, reach);
+            if !core.branches.take(Switch::Overlap, None, deepest > tolerance) {
                 break;
             }
             // also those that the correction may push together
-            detect(core, None, (h, PredictionMode::Each), &mut self.end.contact_constraints);
-            core.report = report;
-            self.end.contact_constraints.retain(|t| t.found_at == 0.0);
-            self.allow_old_overlap(core.settings.recovery_speed * h);
+            if PUSHED * deepest > reach {
+                reach = PUSHED * deepest;
+                self.find_at_end(core, h, reach);
+            }
             build_rows(core, None, &mut self.end, Level::Velocity { h }, 0.0)?;
             let least = LEAST_SWEEPS * self.end.rows.blocks.len();
             if core.meter.left(1.0).is_some_and(|left| (left as usize) < least) {
@@ -132,7 +143,9 @@ impl TimeStepping {
                 limits: Limits::Free,
                 recovery: f64::INFINITY,
                 tolerance: core.settings.contact_tolerance,
+                effort: EFFORT,
             };
+            core.table.walk.parts.copy(&core.derived.part_states, &mut self.before);
             self.end.frictionless.du.clear();
             correction::correct(core, None, &mut self.end, &mut self.probe, &options)?;
             if self.end.frictionless.du.iter().all(|du| *du == 0.0) {
@@ -140,8 +153,44 @@ impl TimeStepping {
             }
             self.pay_at_end(core);
             core.integration().refresh();
+            let done = self.is_separated(core, reach);
+            if core.branches.take(Switch::Overlap, None, done) {
+                break;
+            }
         }
         Ok(())
+    }
+
+    /// Returns whether the last correction has left no overlap beyond the tolerance, by its rows: if bodies have moved so little
+    /// that the contacts within `reach`, m, are all that matter, and turned so little that their rows tell their gaps.
+    fn is_separated(&self, core: &Core, reach: f64) -> bool {
+        let (end, half) = (&self.end, 0.5 * core.settings.drift_tolerance);
+        let is_rigid = |block: &Block| block.sides().iter().all(|side| side.dof == 6);
+        let closes = |(constraint, block): (&ContactConstraint, &Block)| {
+            constraint.gap_of_row() + end.rows.row_velocity(block, 0, &end.frictionless.du) < -half
+        };
+        if !end.rows.blocks.iter().all(is_rigid) || end.contact_constraints.iter().zip(&end.rows.blocks).any(closes) {
+            return false;
+        }
+        let far = |part: usize| {
+            let (before, after) = (&self.before[part], &core.derived.part_states[part]);
+            let way = (after.position() - before.position()).norm();
+            let turn = 2.0 * (after.pose.rotation * before.pose.rotation.inverse()).imag().norm();
+            let radius = shape_of(core, part as u32).map_or(0.0, Shape::bounding_radius);
+            // both bodies of a contact move
+            way + turn * radius > 0.5 * reach || turn * turn * radius > half
+        };
+        !core.table.walk.parts.iter().flatten().any(far)
+    }
+
+    /// Finds the contacts at the end of a step of `h` seconds within a distance, m. Returns the deepest overlap that is to be
+    /// taken away, m.
+    fn find_at_end(&mut self, core: &mut Core, h: f64, distance: f64) -> f64 {
+        let report = core.report;
+        detect(core, None, Reach::in_place(distance), &mut self.end.contact_constraints);
+        core.report = report;
+        self.allow_old_overlap(core.settings.recovery_speed * h);
+        self.end.contact_constraints.iter().map(|t| -t.contact.gap).fold(0.0, f64::max)
     }
 
     /// Returns whether a part with contacts has turned, or any part has left its free motion, by so much that the rows of a
@@ -169,6 +218,9 @@ impl TimeStepping {
     /// most `recovery`.
     fn allow_old_overlap(&mut self, recovery: f64) {
         let known = &self.work.contact_constraints;
+        if !known.iter().any(|t| t.found_at == 0.0 && -t.contact.gap > recovery) {
+            return;
+        }
         for constraint in &mut self.end.contact_constraints {
             let pair = constraint.key.pair;
             let first = known.partition_point(|t| t.key.pair < pair);
@@ -190,9 +242,7 @@ impl TimeStepping {
         end.islands.build(rows, |b| b >= contacts || coordinates(&rows.blocks[b]).any(|i| moved[i] != 0.0));
         let mut du = vec![0.0; u.len()];
         for blocks in end.islands.iter() {
-            let mut places: Vec<usize> = blocks.iter().flat_map(|&b| coordinates(&rows.blocks[b as usize])).collect();
-            places.sort_unstable();
-            places.dedup();
+            let places = coordinates_of(rows, blocks);
             let sum = |of: &dyn Fn(usize) -> f64| places.iter().map(|&i| of(i)).sum::<f64>();
             let lift = -sum(&|i| force[i] * moved[i]);
             let driven = |&b: &u32| {

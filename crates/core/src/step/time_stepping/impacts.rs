@@ -17,7 +17,7 @@ use super::moving::FreeTerms;
 use super::{Buffers, TimeStepping, in_the_middle, moving};
 use crate::constraint::rows::Side;
 use crate::contact::detect::ContactConstraint;
-use crate::contact::pair::PredictionMode;
+use crate::contact::pair::{PredictionMode, Reach};
 use crate::contact::time_of_impact::{moving_pair, time_to_close};
 use crate::integrators::context::free_motion;
 use crate::object::Level;
@@ -173,14 +173,16 @@ impl TimeStepping {
         let (mut struck, mut found) = (core.moment(), Vec::new());
         push(struck.coordinates_by(core, &mut middle.derived.caches), &change, &mut Vec::new());
         struck.refresh(core);
-        detect(core, Some(&struck), (h, PredictionMode::Each), &mut found);
+        let mut old: Vec<[u32; 4]> = self.work.contact_constraints.iter().map(|t| t.key.pair).collect();
+        old.dedup();
+        let reach = Reach { known: &old, ..Reach::in_time(h, PredictionMode::Each) };
+        detect(core, Some(&struck), reach, &mut found);
         core.moments.push(struck);
-        let work = &self.work;
-        let old: Vec<[u32; 4]> = work.contact_constraints.iter().map(|t| t.key.pair).collect();
         found.retain(|t| old.binary_search(&t.key.pair).is_err());
         if !found.is_empty() {
             self.file(core, middle, found);
         }
+        core.report.contacts = self.work.contact_constraints.len() as u32;
     }
 
     /// Leaves the impacts of large groups of touching bodies to the rebound at the end of the step.

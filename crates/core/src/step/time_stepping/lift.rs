@@ -21,7 +21,7 @@
 //! All velocities of a group get one factor, so those of its rows that are zero stay so. A group that
 //! kinematic bodies, moving surfaces or motors may drive gives nothing: they add energy.
 
-use crate::constraint::rows::Block;
+use crate::constraint::rows::{Block, Rows};
 use crate::step::Workspace;
 use crate::step::contacts::push;
 use crate::world::Coordinates;
@@ -52,6 +52,15 @@ pub(super) fn coordinates(block: &Block) -> impl Iterator<Item = usize> + '_ {
     block.sides().iter().flat_map(|side| side.u as usize..(side.u + side.dof) as usize)
 }
 
+/// Returns the coordinates of all sides of some blocks, ascending.
+pub(super) fn coordinates_of(rows: &Rows, blocks: &[u32]) -> Vec<usize> {
+    let sides = blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides());
+    let mut ranges: Vec<(u32, u32)> = sides.map(|side| (side.u, side.dof)).collect();
+    ranges.sort_unstable();
+    ranges.dedup();
+    ranges.iter().flat_map(|&(u, dof)| u as usize..(u + dof) as usize).collect()
+}
+
 /// Takes the potential energy of lifts from the kinetic energy of the groups.
 pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
     let strikes = step.impact.iter().any(|impulse| *impulse != 0.0) || step.keep.iter().any(|keep| !keep);
@@ -75,9 +84,7 @@ pub(super) fn pay_for_lift(at: Coordinates, work: &mut Workspace, step: &Step) {
     };
     islands.build(rows, acts);
     for blocks in islands.iter() {
-        let mut places: Vec<usize> = blocks.iter().flat_map(|&b| coordinates(&rows.blocks[b as usize])).collect();
-        places.sort_unstable();
-        places.dedup();
+        let places = coordinates_of(rows, blocks);
         let sum = |of: &dyn Fn(usize) -> f64| places.iter().map(|&i| of(i)).sum::<f64>();
         let lift = -sum(&|i| step.du_force[i] * step.moved[i]);
         if lift <= 0.0 || !blocks.iter().any(strikes) {

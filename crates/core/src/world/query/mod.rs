@@ -140,11 +140,11 @@ impl World {
             let shape = match &actors {
                 None => own.meeting(filter.group, filter.mask)?,
                 Some(actors) => {
-                    let surface = (part.id, part.part, own.body.material(part.part));
+                    let material = own.body.material(part.part);
                     let meet = actors.iter().filter(|(id, actor)| {
                         let apart = *id != part.id || own.body.parts_collide(actor.part, part.part);
-                        let actor = (*id, actor.part, actor.body.material(actor.part));
-                        apart && !self.core.pair_materials.ignores(actor, surface)
+                        let of_actor = (*id, actor.part, &actor.body.material(actor.part));
+                        apart && !self.core.pair_materials.ignores(of_actor, (part.id, part.part, &material))
                     });
                     let meet: Vec<FilteredPart<'_>> = meet.map(|(_, actor)| *actor).collect();
                     own.met_by(&meet, filter.group, filter.mask)?

@@ -50,8 +50,9 @@ impl World {
         if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
             return None;
         }
-        let surface = |p: &Part<'_>| Some((p.id, p.part, p.entry.object.collidable()?.material(p.part)));
-        if self.core.pair_materials.ignores(surface(a)?, surface(b)?) {
+        let material = |p: &Part<'_>| Some(p.entry.object.collidable()?.material(p.part));
+        let (of_a, of_b) = (material(a)?, material(b)?);
+        if self.core.pair_materials.ignores((a.id, a.part, &of_a), (b.id, b.part, &of_b)) {
             return None;
         }
         let mode = a.mode.of_pair(b.mode);
