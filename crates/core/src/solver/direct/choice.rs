@@ -66,28 +66,6 @@ impl Point {
         }
     }
 
-    /// Appends the other choices of a block, each with its distance: the velocity by which the point would have to
-    /// change to ask for it.
-    pub fn others(&self, block: &LocalBlock, mut add: impl FnMut(f64, Choice)) {
-        let (x, d) = (self.moved(block), block.diagonal);
-        let now = self.choice(block);
-        if let Kind::Cone { mu } = block.kind {
-            let (opening, friction) = (d * x[0].abs(), d * (length(x[1], x[2]) - mu * x[0]).abs());
-            for choice in [Choice::Open, Choice::Free, Choice::Slide].into_iter().filter(|c| *c != now) {
-                let opens = choice == Choice::Open || now == Choice::Open;
-                add(if opens { opening } else { friction }, choice);
-            }
-        }
-        let Some((lo, hi)) = block.kind.bounds() else { return };
-        for (choice, bound) in [(Choice::Low, lo), (Choice::High, hi)].into_iter().filter(|(_, b)| b.is_finite()) {
-            match now {
-                Choice::Free => add(d * (x[0] - bound).abs(), choice),
-                _ if now == choice => add(d * (x[0] - bound).abs(), Choice::Free),
-                _ => {}
-            }
-        }
-    }
-
     /// Returns the multipliers that a choice asks for.
     #[inline(always)]
     pub fn target(&self, block: &LocalBlock, choice: Choice) -> V3 {

@@ -5,7 +5,7 @@
 //! grow with the island:
 //!
 //! 0. a small island first by Newton's method on the function of Alart and Curnier (`newton.rs`), in the midst
-//!    of its sweeps;
+//!    of its sweeps, alternating with the method of multipliers (`multipliers.rs`);
 //! 1. from multipliers that are near, a few steps of semismooth Newton with a proximal term (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
@@ -25,6 +25,7 @@ mod interior_point;
 mod island;
 mod lagged;
 mod lu;
+mod multipliers;
 mod newton;
 mod proximal;
 mod structure;

@@ -13,15 +13,15 @@
 //! | `ε` | keeps redundant contacts regular; grows after a step along which `|f|` does not fall |
 //!
 //! With the right choices a step is exact except for the curve of sliding friction. The choices follow the iterate,
-//! and a line search along `|f|` accepts some steps uphill. Where they go in circles, a second attempt after ten sweeps
-//! often succeeds. If it fails too, the choices are *held*: those of the multipliers that are there, then each with one
-//! block changed, in the order of how near the block is to that change. Four feet of a robot with friction press each
-//! other through its joints, and then `|f|` has minima that are no solutions; nine of ten times the right choices
-//! differ by at most one block. Other methods solve the rest.
+//! and a line search along `|f|` accepts some steps uphill. Four feet of a robot with friction press each other through
+//! its joints, two contacts of a foot are redundant, and then the choices may go in circles. A second attempt after ten
+//! sweeps alternates with the method of multipliers (`multipliers.rs`), which finds the choices that Newton's method
+//! makes exact. Other methods solve the rest.
 
 use super::choice::{Choice, Derivative, Point};
 use super::dense;
 use super::island::{Island, LocalBlock, largest};
+use super::multipliers::Multipliers;
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, multiply};
 
@@ -30,12 +30,17 @@ use crate::constraint::rows::{Rows, multiply};
 const MAX_ROWS: (usize, usize) = (128, 768);
 /// Degrees of freedom of a wide object, such as a cloth.
 const WIDE: u32 = 256;
-/// Maximum number of steps, and of those with the choices held.
-const STEPS: (u32, u32) = (12, 6);
-/// Number of single changes that are tried.
-const CHANGES: usize = 10;
-/// `ε`: least, first after a step that failed, growth and bound.
-const REGULAR: [f64; 4] = [1e-13, 1e-6, 100.0, 0.1];
+/// Maximum number of steps of a first attempt, of a second one, and after each turn of the method of multipliers.
+const STEPS: [u32; 3] = [12, 6, 4];
+/// Maximum number of turns of the method of multipliers, and of its outer steps in one.
+const TURNS: (i32, u32) = (10, 2);
+/// Its `ε` in the first turn, ratio of the following ones, and bound.
+const PENALTY: [f64; 3] = [1e-5, 0.1, 1e-7];
+/// `ε`: least, first after a step that failed, growth and bound. With less, redundant contacts that disagree by rounding get
+/// forces of any size.
+const REGULAR: [f64; 4] = [1e-7, 1e-5, 100.0, 0.1];
+/// First `ε` where more rows are coupled than the island has velocities: without it the step has no bound.
+const REDUNDANT: f64 = 1e-4;
 /// A step is accepted if `|f|` falls below the largest of this number of last iterates: the way to the right choices
 /// leads uphill now and then (Grippo, Lampariello and Lucidi, *A nonmonotone line search technique for Newton's
 /// method*, 1986).
@@ -124,17 +129,18 @@ impl<'a> SmallIsland<'a> {
         (self.island.c.len() as f64).powi(3) / 3.0 / work_of_blocks(&self.island).1
     }
 
-    /// Solves from the multipliers in `lambda`, and replaces them if it finds better ones. If `thorough`, choices
-    /// are held where those that follow the iterate fail.
+    /// Solves from the multipliers in `lambda`, and replaces them if it finds better ones. If `thorough`, the method of
+    /// multipliers helps where the choices that follow the iterate fail.
     pub fn solve(&mut self, lambda: &mut [f64], tolerance: f64, thorough: bool) -> Direct {
         let tolerance = self.island.tolerance(tolerance);
         let own = self.island.read(lambda);
         let start = self.at(own.clone());
         let error = self.error(&start);
         let mut best = Best { lambda: own, other: Iterate::default(), error, taken: 0, tolerance };
-        self.follow(start, &mut best);
+        self.follow(start, &mut best, STEPS[usize::from(thorough)]);
         if thorough && !best.is_solved() && best.error.is_finite() {
-            self.hold(&mut best);
+            let first = self.island.read(lambda);
+            self.alternate(&mut best, first);
         }
         if best.error < error {
             self.island.write(&best.lambda, lambda);
@@ -142,13 +148,15 @@ impl<'a> SmallIsland<'a> {
         Direct { factorizations: best.taken, converged: best.is_solved() }
     }
 
-    /// Takes steps with the choices that each iterate asks for.
-    fn follow(&mut self, mut at: Iterate, best: &mut Best) {
+    /// Takes at most `most` steps with the choices that each iterate asks for.
+    fn follow(&mut self, mut at: Iterate, best: &mut Best, most: u32) {
         let (mut choices, mut change) = (Vec::new(), Iterate::default());
         self.choose(&at, &mut choices);
-        let mut epsilon = REGULAR[0];
-        let mut sizes = vec![self.size(|block| at.point(block), None)];
-        for _ in 0..STEPS.0 {
+        let coupled = self.island.blocks.iter().zip(&choices).filter(|(_, choice)| choice.is_coupled());
+        let redundant = coupled.map(|(block, _)| block.rows).sum::<usize>() > self.island.dof;
+        let mut epsilon = if redundant { REDUNDANT } else { REGULAR[0] };
+        let mut sizes = vec![self.size(|block| at.point(block))];
+        for _ in 0..most {
             if best.error <= best.tolerance.goal || !sizes.iter().all(|size| size.is_finite()) {
                 return;
             }
@@ -157,7 +165,7 @@ impl<'a> SmallIsland<'a> {
             }
             best.taken += 1;
             let largest = sizes.iter().rev().take(MEMORY).fold(0.0, |a: f64, size| a.max(*size));
-            let size = |t: f64| self.size(|block| at.point_along(&change, t, block), None);
+            let size = |t: f64| self.size(|block| at.point_along(&change, t, block));
             let falls = |t: &f64| size(*t) < (1.0 - 1e-4 * t) * largest;
             let length = match (0..LENGTHS).map(|k| 0.5_f64.powi(k as i32)).find(falls) {
                 Some(length) => {
@@ -178,47 +186,29 @@ impl<'a> SmallIsland<'a> {
             at.advance(&change, length);
             self.choose(&at, &mut choices);
             self.consider(&at, &choices, best);
-            sizes.push(self.size(|block| at.point(block), None));
+            sizes.push(self.size(|block| at.point(block)));
         }
     }
 
-    /// Tries the choices of the best multipliers, and those with one block changed.
-    fn hold(&mut self, best: &mut Best) {
-        let start = self.at(best.lambda.clone());
-        let (mut choices, mut changes) = (Vec::new(), Vec::new());
-        self.choose(&start, &mut choices);
-        for (i, block) in self.island.blocks.iter().enumerate() {
-            start.point(block).others(block, |distance, choice| changes.push((distance, i, choice)));
-        }
-        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        self.follow_held(start.clone(), &choices, best);
-        for (_, i, choice) in changes.into_iter().take(CHANGES) {
-            if best.is_solved() {
+    /// Alternates between the method of multipliers and steps from what it finds.
+    fn alternate(&mut self, best: &mut Best, start: Vec<f64>) {
+        let (mut lambda, mut method) = (start, Multipliers::new(&self.island, &self.k));
+        let mut error = best.error;
+        for turn in 0..TURNS.0 {
+            let epsilon = (PENALTY[0] * PENALTY[1].powi(turn)).max(PENALTY[2]);
+            best.taken += method.improve(&self.island, &mut lambda, (epsilon, TURNS.1), (error, best.tolerance.goal));
+            let at = self.at(lambda.clone());
+            error = self.error(&at);
+            if !error.is_finite() {
                 return;
             }
-            let before = std::mem::replace(&mut choices[i], choice);
-            self.follow_held(start.clone(), &choices, best);
-            choices[i] = before;
-        }
-    }
-
-    /// Takes steps with the choices held.
-    fn follow_held(&mut self, mut at: Iterate, choices: &[Choice], best: &mut Best) {
-        let (mut last, mut change) = (f64::INFINITY, Iterate::default());
-        let mut rises = 0;
-        for _ in 0..STEPS.1 {
-            let size = self.size(|block| at.point(block), Some(choices));
-            rises += u32::from(size >= last);
-            if !size.is_finite() || rises > 2 {
-                return;
+            if error < best.error {
+                best.error = error;
+                best.lambda.copy_from_slice(&lambda);
             }
-            last = size;
-            if !self.change(&at, choices, REGULAR[0], &mut change) {
-                return;
+            if !best.is_solved() {
+                self.follow(at, best, STEPS[2]);
             }
-            best.taken += 1;
-            at.advance(&change, 1.0);
-            self.consider(&at, choices, best);
             if best.is_solved() {
                 return;
             }
@@ -273,16 +263,15 @@ impl<'a> SmallIsland<'a> {
         choices.extend(self.island.blocks.iter().map(|block| at.point(block).choice(block)));
     }
 
-    /// Returns `|f|` with the choices that the points ask for, or with those that are held.
+    /// Returns `|f|` with the choices that the points ask for.
     #[inline(always)]
-    fn size(&self, point: impl Fn(&LocalBlock) -> Point, held: Option<&[Choice]>) -> f64 {
-        let square = |(i, block): (usize, &LocalBlock)| {
+    fn size(&self, point: impl Fn(&LocalBlock) -> Point) -> f64 {
+        let square = |block: &LocalBlock| {
             let point = point(block);
-            let choice = held.map_or_else(|| point.choice(block), |choices| choices[i]);
-            let f = point.function(block, choice);
+            let f = point.function(block, point.choice(block));
             f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
         };
-        self.island.blocks.iter().enumerate().map(square).sum::<f64>().sqrt()
+        self.island.blocks.iter().map(square).sum::<f64>().sqrt()
     }
 
     /// Writes the change that makes the linearized function 0. Returns whether there is one.
