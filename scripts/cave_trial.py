@@ -449,11 +449,11 @@ spacing_m = [0.6, 0.6, 0.202]
 
 
 def walk(seconds):
-    """Keys of a user who in each 20 s walks 1.2 m ahead, against the first row of stacks, and back, and then 0.3 m to the side."""
+    """Keys of a user that walks, in each two minutes, 1.2 m ahead, against the first row of stacks, and back, and then 0.45 m to the side."""
     ahead, back, right, left = 0x1A, 0x16, 0x07, 0x04
-    tour, t = divmod(seconds, 20)
-    aside = left if tour // 20 % 4 in (1, 2) else right
-    return ahead if t < 0.8 else back if t < 1.6 else aside if t < 1.8 else None
+    tour, t = divmod(seconds, 120)
+    aside = left if tour // 8 % 2 else right
+    return ahead if t < 0.8 else back if t < 1.6 else aside if t < 1.9 else None
 
 
 def everywhere(options):
@@ -702,4 +702,5 @@ def main():
     sys.exit(0 if all(shown) else 1)
 
 
-main()
+if __name__ == "__main__":
+    main()
