@@ -475,7 +475,7 @@ def everywhere(options):
                    "--duration", options.everywhere / 60, "--summary", OUT / "everywhere.json", "--quiet")
     facets = [start("facet", scene, "--cave", cave, "--facet", f"f{k}", "--server", f"127.0.0.1:{relay.port}", "--user-colliders", "--no-pictures", "--log-dir", folder,
                     "--connect-timeout", 120) for k in range(nodes)]
-    tracker, said = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0
+    tracker, said, ended = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), 0, False
     pad = lambda text: text.encode().ljust(len(text) // 4 * 4 + 4, b"\0")
     while server.poll() is None:
         frame = (last_line(folder, "f0") or {"frame": 0})["frame"]
@@ -487,8 +487,9 @@ def everywhere(options):
         if frame // 6000 > said:
             said = frame // 6000
             print(f"everywhere: frame {frame} after {time.time() - began:.0f} s", file=sys.stderr, flush=True)
-        if time.time() - began > 60 * options.minutes:
-            server.terminate()
+        if time.time() - began > 60 * options.minutes and not ended:
+            server.terminate()  # once: a second signal ends a run at once
+            ended = True
         time.sleep(1 / 60)
     [process.wait(timeout=120) for process in facets]
     relay.end()
