@@ -2,6 +2,7 @@
 
 mod cull;
 mod data;
+mod enlarge;
 mod finish;
 mod frame;
 mod kept;
@@ -23,6 +24,7 @@ mod window;
 
 use crate::list::bounds::Bounds;
 use crate::{DrawList, Image, Lens, MAX_PIXELS, MAX_SIDE, Part, RenderError, Viewpoint};
+use enlarge::{Drawn, Enlarger};
 use finish::Finisher;
 pub(crate) use finish::{Around, Bend, Finish, Placed, place_floats};
 use frame::Frame;
@@ -56,6 +58,8 @@ pub struct Renderer {
     meshes: MeshCache,
     textures: TextureCache,
     finisher: Finisher,
+    /// Made for the first picture of half resolution.
+    enlarger: Option<Enlarger>,
     shadows: Option<ShadowMaps>,
     /// Ordered by use, the last used at the end.
     targets: Vec<Targets>,
@@ -128,6 +132,7 @@ impl Renderer {
             meshes: MeshCache::default(),
             textures,
             finisher,
+            enlarger: None,
             shadows: None,
             targets: Vec::new(),
             picture: None,
@@ -280,17 +285,23 @@ impl Renderer {
 
     /// Draws all pixels of a view, including the rim of its lens, and keeps the middle.
     fn draw_lens(&mut self, stage: &Stage, lens: Lens, width: u32, height: u32) -> Result<(), RenderError> {
-        let rim = self.draw_with_rim(stage, lens, width, height)?;
-        self.picture = match self.targets.last() {
-            Some(t) if rim == 0 => Some(t.resolved.clone()),
-            Some(t) => Some(self.finisher.cut(&self.gpu, &t.resolved, rim)),
-            None => None,
-        };
+        let (drawn, rim) = self.draw_with_rim(stage, lens, width, height)?;
+        self.picture = Some(match rim {
+            0 => drawn.texture,
+            _ => self.finisher.cut(&self.gpu, &drawn.texture, rim),
+        });
         self.submit()
     }
 
-    /// Records a view into the last targets. Returns the width of the rim in pixels.
-    fn draw_with_rim(&mut self, stage: &Stage, mut lens: Lens, width: u32, height: u32) -> Result<u32, RenderError> {
+    /// Records a view, drawn with fewer pixels and enlarged if the stage says so. Returns the picture with its rim, and
+    /// the width of the rim in pixels.
+    fn draw_with_rim(
+        &mut self,
+        stage: &Stage,
+        mut lens: Lens,
+        width: u32,
+        height: u32,
+    ) -> Result<(Drawn, u32), RenderError> {
         // only occlusion reads beyond the edge
         let rim = lens.part.map_or(0, |part| if stage.reach > 0.0 { part.rim_px } else { 0 });
         lens.part = lens.part.map(|part| Part { rim_px: rim, ..part });
@@ -300,7 +311,13 @@ impl Renderer {
         }
         let mut encoder =
             self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
-        self.want_targets(width + 2 * rim, height + 2 * rim, stage.variant.samples);
+        let whole = [width + 2 * rim, height + 2 * rim];
+        let [across, down] = if stage.half { whole.map(enlarge::half) } else { whole };
+        if stage.half {
+            lens.part =
+                lens.part.map(|part| Part { first_pixel: part.first_pixel.map(|pixel| pixel.div_euclid(2)), ..part });
+        }
+        self.want_targets(across, down, stage.variant.samples);
         let targets = &self.targets[self.targets.len() - 1]; // put there by the line above
         let (size, count) = (stage.shadow_map_size, stage.shadow_views.len());
         let maps = match self.shadows.take().filter(|maps| maps.fits(size, count)) {
@@ -314,9 +331,18 @@ impl Renderer {
         let frame = Frame::new(&self.gpu, &self.pipelines, stage, maps, targets, &lens)?;
         self.gpu.complaint()?;
         frame.draw(&mut encoder, &self.pipelines);
+        let drawn = match stage.half {
+            false => targets.drawn(),
+            true => self.enlarger.get_or_insert_with(|| Enlarger::new(&self.gpu)).enlarge(
+                &self.gpu,
+                &mut encoder,
+                targets,
+                whole,
+            ),
+        };
         self.gpu.record(encoder.finish());
         self.gpu.complaint()?;
-        Ok(rim)
+        Ok((drawn, rim))
     }
 
     /// Records the view of one eye, finished for its projector, at its place in the whole picture of this
@@ -331,9 +357,8 @@ impl Renderer {
         self.check_size(width, height)?;
         self.check_size(placed.whole_px[0], placed.whole_px[1])?;
         let lens = from.lens(width as f32 / height as f32)?;
-        let rim = self.draw_with_rim(stage, lens, width, height)?;
-        let targets = &self.targets[self.targets.len() - 1]; // put there by drawing
-        self.picture = Some(self.finisher.place(&self.gpu, targets, rim, [width, height], placed)?);
+        let (drawn, rim) = self.draw_with_rim(stage, lens, width, height)?;
+        self.picture = Some(self.finisher.place(&self.gpu, &drawn, rim, [width, height], placed)?);
         self.gpu.complaint()
     }
 
@@ -347,9 +372,8 @@ impl Renderer {
         [whole_px, at_px]: [[u32; 2]; 2],
     ) -> Result<(), RenderError> {
         self.check_size(whole_px[0], whole_px[1])?;
-        let rim = self.draw_with_rim(stage, from.lens(1.0)?, side, side)?;
-        let targets = &self.targets[self.targets.len() - 1]; // put there by drawing
-        self.finisher.place_face(&self.gpu, targets, rim, side, [whole_px, at_px]);
+        let (drawn, rim) = self.draw_with_rim(stage, from.lens(1.0)?, side, side)?;
+        self.finisher.place_face(&self.gpu, &drawn, rim, side, [whole_px, at_px]);
         self.gpu.complaint()
     }
 
@@ -373,7 +397,7 @@ impl Renderer {
                 {
                     self.targets.remove(0);
                 }
-                self.targets.push(Targets::new(&self.gpu.device, width, height, samples));
+                self.targets.push(Targets::new(&self.gpu, width, height, samples));
             }
         }
     }

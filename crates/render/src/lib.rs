@@ -56,8 +56,8 @@ pub use gpu::{
 pub use image::Image;
 pub use list::{
     Capsule, DebugLine, DebugPoint, DebugSphere, DebugStyle, DrawList, Ground, Instance, Light, MAX_ITEMS, MAX_LIGHTS,
-    MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Settings, Shadows, Sky, SoftSphere, Sphere, SphereCloud, SphereStyle,
-    UnknownQuality,
+    MAX_SHADOWS, MAX_TEXTURES, MeshId, Quality, Resolution, Settings, Shadows, Sky, SoftSphere, Sphere, SphereCloud,
+    SphereStyle, UnknownQuality,
 };
 pub use material::{Material, Pattern, Shader, Texture};
 pub use mesh::{MAX_MESH_VERTICES, MeshData};

@@ -6,7 +6,7 @@ pub(crate) mod debug;
 mod quality;
 mod text;
 mod validate;
-pub use quality::{Quality, Shadows, UnknownQuality};
+pub use quality::{Quality, Resolution, Shadows, UnknownQuality};
 pub use validate::{MAX_ITEMS, MAX_LIGHTS, MAX_SHADOWS, MAX_TEXTURES};
 
 pub use debug::{DebugLine, DebugPoint, DebugSphere, DebugStyle, SphereStyle};
@@ -270,6 +270,8 @@ pub struct Settings {
     /// Whether surfaces reflect the sky and have clear coats and full highlights; without it a
     /// cheap approximation is used.
     pub reflections: bool,
+    /// How many of the pixels are drawn.
+    pub resolution: Resolution,
 }
 
 impl Default for Settings {
@@ -282,6 +284,7 @@ impl Default for Settings {
             shadows: Shadows::Soft,
             samples: 4,
             reflections: true,
+            resolution: Resolution::Full,
         }
     }
 }

@@ -8,6 +8,7 @@
 //! (N, m, world axes). A shape is the index of a compound's part, 0 for all others. Contacts with objects that are not in the table are left out. A facet shows
 //! them and computes nothing with them.
 
+use super::pairs::{Parts, put_pairs};
 use super::wire::{ByteReader, MessageError};
 use std::collections::BTreeMap;
 use tumble_collide::Vec3;
@@ -22,18 +23,18 @@ pub(crate) fn put_contacts<'a>(
     contacts: impl IntoIterator<Item = &'a ContactPoint>,
     index: &BTreeMap<ObjectId, u32>,
 ) {
-    let start = out.len();
-    out.extend([0; 4]);
-    let mut count = 0u32;
-    for c in contacts {
-        let (Some(a), Some(b)) = (index.get(&c.a), index.get(&c.b)) else { continue };
-        let sides = [*a, c.part_a as u32, c.shape_a as u32, *b, c.part_b as u32, c.shape_b as u32];
-        out.extend(sides.iter().flat_map(|i| i.to_le_bytes()));
-        let numbers = c.point.iter().chain(&c.normal).chain([&c.depth]).chain(&c.force);
-        out.extend(numbers.flat_map(|x| (*x as f32).to_le_bytes()));
-        count += 1;
-    }
-    out[start..start + 4].copy_from_slice(&count.to_le_bytes());
+    put_pairs(
+        out,
+        contacts,
+        index,
+        |c| [c.a, c.b],
+        |out, c, [a, b]| {
+            let sides = [a, c.part_a as u32, c.shape_a as u32, b, c.part_b as u32, c.shape_b as u32];
+            out.extend(sides.iter().flat_map(|i| i.to_le_bytes()));
+            let numbers = c.point.iter().chain(&c.normal).chain([&c.depth]).chain(&c.force);
+            out.extend(numbers.flat_map(|x| (*x as f32).to_le_bytes()));
+        },
+    );
 }
 
 /// Reads the contacts of a message. `ids` are the objects of the table; the viewer has none.
@@ -49,24 +50,18 @@ pub(crate) fn get_contacts(
     if count > MAX_CONTACTS {
         return Err(MessageError::Malformed("more than 256 contacts"));
     }
+    let parts = Parts { ids, world, unknown: MessageError::Malformed("a contact of an unknown part") };
+    let side = |rest: &mut ByteReader<'_>| {
+        let (id, part) = parts.read(rest)?;
+        Ok::<_, MessageError>((id, part, rest.u32()? as usize))
+    };
     let mut contacts = Vec::with_capacity(count);
     for _ in 0..count {
-        let sides = [side(rest, ids, world)?, side(rest, ids, world)?];
+        let sides = [side(rest)?, side(rest)?];
         let (point, normal, depth, force) = (vector(rest)?, vector(rest)?, number(rest)?, vector(rest)?);
         contacts.push(ContactPoint::shown(sides, point, normal, depth, force));
     }
     Ok(contacts)
-}
-
-/// Reads object, part and shape of one side.
-fn side(
-    rest: &mut ByteReader<'_>,
-    ids: &[Option<ObjectId>],
-    world: &World,
-) -> Result<(ObjectId, usize, usize), MessageError> {
-    let (object, part, shape) = (rest.u32()? as usize, rest.u32()? as usize, rest.u32()? as usize);
-    let id = ids.get(object).copied().flatten().filter(|&id| world.part_state(id, part).is_some());
-    id.map(|id| (id, part, shape)).ok_or(MessageError::Malformed("a contact of an unknown part"))
 }
 
 fn number(rest: &mut ByteReader<'_>) -> Result<f64, MessageError> {

@@ -69,6 +69,7 @@ mod frame_hash;
 mod input;
 mod local;
 mod mirror;
+mod pairs;
 mod publisher;
 mod recording;
 mod render_proxy;

@@ -7,6 +7,7 @@
 //! They are sent with the events, all or none: the count `0xffff_ffff` is that of a frame without them. `sensor` is 1 if a, or a shape of
 //! it, is a sensor. Objects are indices of the object table.
 
+use super::pairs::{Parts, put_pairs};
 use super::wire::{ByteReader, MessageError};
 use std::collections::BTreeMap;
 use tumble_core::{ObjectId, TouchingPair, World};
@@ -22,16 +23,16 @@ pub(crate) fn put_touching(out: &mut Vec<u8>, world: &World, wanted: bool, index
     let Some(pairs) = pairs.filter(|pairs| pairs.len() <= MAX_TOUCHING) else {
         return out.extend(UNKNOWN.to_le_bytes());
     };
-    let start = out.len();
-    out.extend([0; 4]);
-    let mut count = 0u32;
-    for TouchingPair { sides: [(a, part_a), (b, part_b)], sensor } in pairs {
-        let (Some(a), Some(b)) = (index.get(&a), index.get(&b)) else { continue };
-        out.push(u8::from(sensor));
-        out.extend([*a, part_a as u32, *b, part_b as u32].iter().flat_map(|i| i.to_le_bytes()));
-        count += 1;
-    }
-    out[start..start + 4].copy_from_slice(&count.to_le_bytes());
+    put_pairs(
+        out,
+        pairs,
+        index,
+        |pair| pair.sides.map(|(id, _)| id),
+        |out, TouchingPair { sides: [(_, part_a), (_, part_b)], sensor }, [a, b]| {
+            out.push(u8::from(sensor));
+            out.extend([a, part_a as u32, b, part_b as u32].iter().flat_map(|i| i.to_le_bytes()));
+        },
+    );
 }
 
 /// Reads the pairs of a message; `None` if it has none. `ids` are the objects of the table; the viewer has none.
@@ -48,19 +49,14 @@ pub(crate) fn get_touching(
         count if count as usize > MAX_TOUCHING => return Err(MessageError::Malformed("more than 65536 pairs")),
         count => count,
     };
+    let parts = Parts { ids, world, unknown: MessageError::Malformed("a pair of an unknown part") };
     let mut pairs = Vec::new();
     for _ in 0..count {
         let sensor = match rest.u8()? {
             flag @ (0 | 1) => flag == 1,
             _ => return Err(MessageError::Malformed("an unknown flag of a pair")),
         };
-        pairs.push(TouchingPair { sides: [side(rest, ids, world)?, side(rest, ids, world)?], sensor });
+        pairs.push(TouchingPair { sides: [parts.read(rest)?, parts.read(rest)?], sensor });
     }
     Ok(Some(pairs))
-}
-
-fn side(rest: &mut ByteReader<'_>, ids: &[Option<ObjectId>], world: &World) -> Result<(ObjectId, usize), MessageError> {
-    let (object, part) = (rest.u32()? as usize, rest.u32()? as usize);
-    let id = ids.get(object).copied().flatten().filter(|&id| world.part_state(id, part).is_some());
-    id.map(|id| (id, part)).ok_or(MessageError::Malformed("a pair of an unknown part"))
 }

@@ -7,10 +7,11 @@
 //! taken from the faces of a cube of pictures in the same pass.
 
 use super::Gpu;
+use super::enlarge::Drawn;
 use super::frame::bind;
 use super::meshes::uniform_buffer;
 use super::pipelines::COLOR;
-use super::targets::{Targets, finished_texture};
+use super::targets::finished_texture;
 use crate::RenderError;
 use crate::facet::{NumberFormat, Parity, PortableNumbers, ProjectorColor};
 use std::sync::Arc;
@@ -186,11 +187,11 @@ impl Finisher {
         whole
     }
 
-    /// Places the picture of the targets and returns the whole.
+    /// Places a picture and returns the whole.
     pub fn place(
         &mut self,
         gpu: &Gpu,
-        from: &Targets,
+        from: &Drawn,
         rim: u32,
         size: [u32; 2],
         placed: &Placed,
@@ -199,24 +200,24 @@ impl Finisher {
         let plain = placed.is_plain();
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
         if placed.begin.is_some() || !plain {
-            self.pass(gpu, &mut encoder, (&from.picture, &whole), (rim, size, placed), None)?;
+            self.pass(gpu, &mut encoder, (&from.view, &whole), (rim, size, placed), None)?;
         }
         if plain {
-            copy(&mut encoder, &from.resolved, rim, size, &whole, placed.at_px);
+            copy(&mut encoder, &from.texture, rim, size, &whole, placed.at_px);
         }
         gpu.record(encoder.finish());
         Ok(whole)
     }
 
-    /// Copies the picture of the targets, without its rim, to a face of the cube of pictures, which
+    /// Copies a picture, without its rim, to a face of the cube of pictures, which
     /// has this size.
-    pub fn place_face(&mut self, gpu: &Gpu, from: &Targets, rim: u32, side: u32, [whole, at]: [[u32; 2]; 2]) {
+    pub fn place_face(&mut self, gpu: &Gpu, from: &Drawn, rim: u32, side: u32, [whole, at]: [[u32; 2]; 2]) {
         let faces = match &self.faces {
             Some(faces) if [faces.width(), faces.height()] == whole => faces,
             _ => self.faces.insert(finished_texture(&gpu.device, "faces", whole[0], whole[1])),
         };
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("face") });
-        copy(&mut encoder, &from.resolved, rim, [side; 2], faces, at);
+        copy(&mut encoder, &from.texture, rim, [side; 2], faces, at);
         gpu.record(encoder.finish());
     }
 

@@ -9,7 +9,8 @@ use super::{Gpu, scene};
 use crate::list::bounds::Bounds;
 use crate::list::debug::strokes;
 use crate::{
-    DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Shadows, SoftSphere, SphereStyle,
+    DebugSphere, DrawList, Instance, Material, MeshData, MeshId, RenderError, Resolution, Shadows, SoftSphere,
+    SphereStyle,
 };
 use std::ops::Range;
 use wgpu::{BindGroup, Buffer, CommandEncoder, RenderPass, RenderPipeline};
@@ -20,6 +21,8 @@ pub struct Stage {
     pub(super) serial: u64,
     pub(super) variant: Variant,
     pub(super) shadow_map_size: u32,
+    /// Whether pictures are drawn with half of the pixels in each direction, and enlarged.
+    pub(super) half: bool,
     pub(super) reach: f32,
     /// Each with the spheres that cast its shadows.
     pub(super) shadow_views: Vec<(BindGroup, Choice)>,
@@ -96,6 +99,7 @@ impl Stage {
             serial,
             variant: Variant::new(list, if shadows.is_empty() { Shadows::Off } else { s.shadows }, reach > 0.0),
             shadow_map_size: s.shadow_map_size,
+            half: s.resolution == Resolution::Half,
             reach,
             shadow_views: shadows
                 .iter()

@@ -28,9 +28,10 @@ pub struct Targets {
 }
 
 impl Targets {
-    pub fn new(device: &wgpu::Device, width: u32, height: u32, samples: u32) -> Self {
+    pub fn new(gpu: &Gpu, width: u32, height: u32, samples: u32) -> Self {
+        let device = &gpu.device;
         let make = |label, samples, format, usage| texture(device, label, [width, height, 1], samples, format, usage);
-        let resolved = finished_texture(device, "picture", width, height);
+        let resolved = finished_texture_for(gpu, "picture", width, height);
         Targets {
             width,
             height,
@@ -100,6 +101,21 @@ impl ShadowMaps {
 /// Creates a texture for finished pictures: drawn into, copied from and to, shown by a window.
 pub fn finished_texture(device: &wgpu::Device, label: &str, width: u32, height: u32) -> Texture {
     texture(device, label, [width, height, 1], 1, COLOR, LOOK | TextureUsages::COPY_SRC | TextureUsages::COPY_DST)
+}
+
+/// The same, also for the views by which [`Enlarger`](super::enlarge::Enlarger) mixes colors.
+pub fn finished_texture_for(gpu: &Gpu, label: &str, width: u32, height: u32) -> Texture {
+    let mixed = [super::enlarge::mixed_format(gpu)];
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: COLOR,
+        usage: LOOK | TextureUsages::COPY_SRC | TextureUsages::COPY_DST,
+        view_formats: if mixed == [COLOR] { &[] } else { &mixed },
+    })
 }
 
 /// Waits until all submitted work is done.

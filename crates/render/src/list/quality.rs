@@ -1,4 +1,4 @@
-//! Quality of pictures against speed: shadows, edges, occlusion and reflections by name.
+//! Quality of pictures against speed: shadows, edges, occlusion, reflections and resolution by name.
 
 use super::Settings;
 use std::fmt;
@@ -30,9 +30,20 @@ impl Shadows {
     }
 }
 
+/// How many of the pixels of a picture are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resolution {
+    /// All.
+    #[default]
+    Full,
+    /// Half of them in each direction, a quarter of all; the picture is enlarged before it is finished for a projector.
+    /// Overlays are enlarged with it. Pages in a browser draw all pixels.
+    Half,
+}
+
 /// The part of [`Settings`] that trades appearance for speed. As text: `default`, `fast` or
 /// `fastest`, and after it or alone `shadows=off|hard|soft`, `samples=1|4`, `occlusion=on|off`,
-/// `reflections=on|off`, `map=TEXELS`, separated by commas.
+/// `reflections=on|off`, `resolution=full|half`, `map=TEXELS`, separated by commas.
 ///
 /// ```
 /// use tumble_render::{Quality, Shadows};
@@ -52,26 +63,42 @@ pub struct Quality {
     pub reflections: bool,
     /// Side of a shadow map in texels, 256 to 8192.
     pub shadow_map_size: u32,
+    /// How many of the pixels are drawn.
+    pub resolution: Resolution,
 }
 
 /// A word that names no quality.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "no quality '{0}'; expected default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off or map=TEXELS (256 to 8192), separated by commas"
+    "no quality '{0}'; expected default, fast, fastest, shadows=off|hard|soft, samples=1|4, occlusion=on|off, reflections=on|off, resolution=full|half or map=TEXELS (256 to 8192), separated by commas"
 )]
 pub struct UnknownQuality(String);
 
 impl Default for Quality {
     /// The quality of screenshots: soft shadows, four samples, occlusion.
     fn default() -> Self {
-        Quality { shadows: Shadows::Soft, samples: 4, occlusion: true, reflections: true, shadow_map_size: 2048 }
+        Quality {
+            shadows: Shadows::Soft,
+            samples: 4,
+            occlusion: true,
+            reflections: true,
+            shadow_map_size: 2048,
+            resolution: Resolution::Full,
+        }
     }
 }
 
 impl Quality {
     /// For many bodies on a slow device: hard shadows, one sample, no occlusion.
     pub fn fast() -> Self {
-        Quality { shadows: Shadows::Hard, samples: 1, occlusion: false, reflections: true, shadow_map_size: 1024 }
+        Quality {
+            shadows: Shadows::Hard,
+            samples: 1,
+            occlusion: false,
+            reflections: true,
+            shadow_map_size: 1024,
+            resolution: Resolution::Full,
+        }
     }
 
     /// As [`Quality::fast`], without shadows and reflections.
@@ -86,6 +113,7 @@ impl Quality {
         settings.samples = self.samples;
         settings.reflections = self.reflections;
         settings.shadow_map_size = self.shadow_map_size;
+        settings.resolution = self.resolution;
         if !self.occlusion {
             settings.occlusion_m = Some(0.0);
         }
@@ -112,6 +140,8 @@ impl FromStr for Quality {
                 Some(("occlusion", "off")) => quality.occlusion = false,
                 Some(("reflections", "on")) => quality.reflections = true,
                 Some(("reflections", "off")) => quality.reflections = false,
+                Some(("resolution", "full")) => quality.resolution = Resolution::Full,
+                Some(("resolution", "half")) => quality.resolution = Resolution::Half,
                 Some(("map", side)) => {
                     quality.shadow_map_size =
                         side.parse().ok().filter(|n| (256..=8192).contains(n)).ok_or_else(unknown)?
@@ -127,9 +157,10 @@ impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let occlusion = if self.occlusion { "on" } else { "off" };
         let reflections = if self.reflections { "" } else { "reflections=off," };
+        let resolution = if self.resolution == Resolution::Half { "resolution=half," } else { "" };
         write!(
             f,
-            "shadows={},samples={},occlusion={occlusion},{reflections}map={}",
+            "shadows={},samples={},occlusion={occlusion},{reflections}{resolution}map={}",
             self.shadows.name(),
             self.samples,
             self.shadow_map_size

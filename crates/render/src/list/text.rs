@@ -1,7 +1,7 @@
 //! The text form of a draw list: rounded, in list order. Golden tests without a GPU compare it.
 
 use super::{DebugStyle, DrawList, Light, SphereStyle};
-use crate::{Camera, Material, Pattern, Shader};
+use crate::{Camera, Material, Pattern, Resolution, Shader};
 use std::fmt::{Display, Formatter, Result};
 
 impl DrawList {
@@ -24,7 +24,8 @@ impl Display for DrawList {
             s.occlusion_m.map_or("auto".into(), n),
             s.tone_map
         )?;
-        writeln!(f, " shadows {} samples {} reflections {}", s.shadows.name(), s.samples, s.reflections)?;
+        let half = if s.resolution == Resolution::Half { " resolution half" } else { "" };
+        writeln!(f, " shadows {} samples {} reflections {}{half}", s.shadows.name(), s.samples, s.reflections)?;
         writeln!(
             f,
             "sky: zenith {} horizon {} ground {} ambient {} softbox {} backdrop {}",

@@ -13,6 +13,7 @@ mod particles;
 mod pictures;
 mod portable;
 mod projectors;
+mod resolution;
 mod shading;
 mod soft;
 mod support;

@@ -142,7 +142,7 @@ pub struct RunOptions {
     #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// Quality of pictures against speed: default, fast, fastest, and shadows=off|hard|soft,
-    /// samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; separated by commas.
+    /// samples=1|4, occlusion=on|off, reflections=on|off, resolution=full|half, map=TEXELS; separated by commas.
     #[arg(long, help_heading = "Pictures", value_name = "WHAT", default_value = "default")]
     pub quality: tumble::render::Quality,
     /// The camera: scene, or the name of an object with a camera.
@@ -186,7 +186,7 @@ pub struct ViewOptions {
     #[arg(long, help_heading = "Window", value_name = "WHAT", default_value = "")]
     pub debug_draw: Overlays,
     /// Quality of pictures against speed: default, fast or fastest, or shadows=off|hard|soft,
-    /// samples=1|4, occlusion=on|off, reflections=on|off, map=TEXELS; separated by commas (default:
+    /// samples=1|4, occlusion=on|off, reflections=on|off, resolution=full|half, map=TEXELS; separated by commas (default:
     /// default; fast with a software driver).
     #[arg(long, help_heading = "Window", value_name = "WORDS")]
     pub quality: Option<Quality>,
