@@ -65,7 +65,7 @@ pub(in crate::solver) struct SmallIsland<'a> {
     island: Island<'a>,
     /// `K + R`, row-major.
     k: Vec<f64>,
-    /// Of each bound that follows normal forces: their rows, with the factors `a`.
+    /// Rows of the normal forces that each bound follows, with the factors `a`.
     bounds: Vec<Vec<(usize, f64)>>,
     memory: Memory,
 }
