@@ -76,6 +76,11 @@ impl Multipliers {
         }
     }
 
+    /// Returns the rank of the island.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
     /// Improves multipliers by `outer` outer steps with `ε = epsilon`; those have `error`, and `goal` is to be reached.
     /// Returns the number of factorizations.
     pub fn improve(

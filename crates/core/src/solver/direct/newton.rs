@@ -48,8 +48,8 @@ const REGULAR: [f64; 4] = [1e-7, 1e-5, 100.0, 0.1];
 const HELD_STEPS: u32 = 6;
 const HELD: f64 = 1e-13;
 const CHANGES: usize = 10;
-/// Choices are held before the method of multipliers is tried, and not after it, if there are at most this number of rows for a
-/// velocity: then contacts are seldom redundant.
+/// Choices are held before the method of multipliers is tried, and not after it, if there are at most this number of rows for each
+/// of the island's rank: then contacts are seldom redundant.
 const BRACED: f64 = 1.25;
 /// First `ε` where more rows are coupled than the island has velocities: without it the step has no bound.
 const REDUNDANT: f64 = 1e-4;
@@ -190,13 +190,14 @@ impl<'a> SmallIsland<'a> {
         let mut best = Best { lambda: own, other: Iterate::default(), error, taken: 0, tolerance };
         self.follow(start, &mut best, STEPS[usize::from(thorough)]);
         if thorough && !best.is_solved() && best.error.is_finite() {
-            let braced = self.island.c.len() as f64 <= BRACED * self.island.dof as f64;
+            let method = Multipliers::new(&self.island, &self.k);
+            let braced = self.island.c.len() as f64 <= BRACED * method.rank() as f64;
             if braced {
                 self.hold(&mut best);
             }
             if !best.is_solved() {
                 let first = self.island.read(lambda);
-                self.alternate(&mut best, first);
+                self.alternate(&mut best, first, method);
             }
             if !braced && !best.is_solved() {
                 self.hold(&mut best);
@@ -251,8 +252,7 @@ impl<'a> SmallIsland<'a> {
     }
 
     /// Alternates between the method of multipliers and steps from what it finds.
-    fn alternate(&mut self, best: &mut Best, start: Vec<f64>) {
-        let (mut lambda, mut method) = (start, Multipliers::new(&self.island, &self.k));
+    fn alternate(&mut self, best: &mut Best, mut lambda: Vec<f64>, mut method: Multipliers) {
         let mut error = best.error;
         for turn in 0..TURNS.0 {
             let epsilon = (PENALTY[0] * PENALTY[1].powi(turn)).max(PENALTY[2]);
