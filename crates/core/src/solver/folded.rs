@@ -51,9 +51,21 @@ impl Folded {
     pub fn new(rows: &Rows, blocks: &[u32], (c, lambda): (&[f64], &[f64])) -> Option<Folded> {
         let (soft, members): (SmallVec<[u32; 32]>, SmallVec<[u32; 32]>) =
             blocks.iter().copied().partition(|&b| is_soft(rows, &rows.blocks[b as usize]));
-        if soft.is_empty() {
-            return None;
-        }
+        (!soft.is_empty()).then(|| Folded::of(rows, blocks, (c, lambda), (soft, members)))
+    }
+
+    /// Returns the island without its soft rows, if there are any.
+    pub fn copied(rows: &Rows, blocks: &[u32], (c, lambda): (&[f64], &[f64])) -> Folded {
+        let parts = blocks.iter().copied().partition(|&b| is_soft(rows, &rows.blocks[b as usize]));
+        Folded::of(rows, blocks, (c, lambda), parts)
+    }
+
+    fn of(
+        rows: &Rows,
+        blocks: &[u32],
+        (c, lambda): (&[f64], &[f64]),
+        (soft, members): (SmallVec<[u32; 32]>, SmallVec<[u32; 32]>),
+    ) -> Folded {
         let objects = objects_of(rows, blocks);
         let mut folded = Folded {
             rows: Rows::default(),
@@ -69,7 +81,12 @@ impl Folded {
         };
         folded.factor(rows, c);
         folded.respond(rows, (c, lambda));
-        Some(folded)
+        folded
+    }
+
+    /// Returns the blocks of the island that are left, in their order.
+    pub fn members(&self) -> &[u32] {
+        &self.members
     }
 
     /// Returns the number of velocities of the island.
@@ -139,11 +156,17 @@ impl Folded {
         }
     }
 
-    /// Writes the solution, of which `du` of the island's velocities is a part: the multipliers of all blocks, and
-    /// `all`, the velocities of all objects.
-    pub fn write(&self, rows: &Rows, c: &[f64], du: &mut [f64], lambda: &mut [f64], all: &mut [f64]) {
+    /// Writes the solution, of which the multipliers `solved` of the blocks that are left and `du` of the island's velocities
+    /// are a part: the multipliers of all blocks, and `all`, the velocities of all objects.
+    pub fn write(
+        &self,
+        (rows, c): (&Rows, &[f64]),
+        (solved, du): (&[f64], &mut [f64]),
+        lambda: &mut [f64],
+        all: &mut [f64],
+    ) {
         for (block, &member) in self.rows.blocks.iter().zip(&self.members) {
-            lambda[rows.blocks[member as usize].range()].copy_from_slice(&self.lambda[block.range()]);
+            lambda[rows.blocks[member as usize].range()].copy_from_slice(&solved[block.range()]);
         }
         for (object, factor) in self.objects.iter().zip(&self.factor) {
             let own = &mut du[object.first..][..object.dof];

@@ -38,7 +38,7 @@ use super::linkage::Linkages;
 use super::local::{Local, Progress, apply, with_memory, write_back};
 use super::reduced::Reduced;
 use super::relaxation::Relaxation;
-use super::{RowSolver, SolveReport, SolverSettings, residual};
+use super::{RIGID, RowSolver, SolveReport, SolverSettings, residual};
 use crate::constraint::rows::{RowSet, Rows, dot};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -57,8 +57,6 @@ const NEWTON: [u32; 2] = [2, 12];
 const TINY: usize = 4;
 /// The same for an island with a wide object.
 const NEWTON_OF_WIDE: [u32; 3] = [12, 30, 80];
-/// Degrees of freedom of a rigid body.
-const RIGID: u32 = 6;
 
 /// A few sweeps follow a direct solution that is not finished, in islands of at most this number of
 /// blocks.
@@ -99,6 +97,10 @@ impl RowSolver for GaussSeidel {
         }
     }
 
+    fn follows_forces(&self) -> bool {
+        true
+    }
+
     fn fork(&self) -> Box<dyn RowSolver> {
         Box::new(*self)
     }
@@ -118,7 +120,7 @@ fn solve_folded(
     } else {
         solve_island((rest, blocks, free), (start, &mut own), settings)
     };
-    folded.write(rows, c, &mut own, lambda, du);
+    folded.write((rows, c), (&folded.lambda, &mut own), lambda, du);
     outcome
 }
 

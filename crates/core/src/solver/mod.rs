@@ -3,6 +3,7 @@
 //! Find `λ` in the rows' sets so that `w = c + (K + R)·λ` (`R`: compliance of soft rows) satisfies
 //! each set as [`RowSet`](crate::constraint::rows::RowSet) defines it.
 
+mod coupled;
 mod direct;
 mod dof6;
 mod equality;
@@ -23,6 +24,7 @@ mod residual;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use coupled::{CoupledIsland, Folding};
 pub(crate) use equality::smallest_pivot;
 pub use gauss_seidel::GaussSeidel;
 pub use island::Islands;
@@ -51,6 +53,9 @@ pub struct SolverSettings {
     /// [`RowSolver::solve`], the maximum work of this solve. `None`: no bound.
     pub budget: Option<u32>,
 }
+
+/// Degrees of freedom of a rigid body.
+const RIGID: u32 = 6;
 
 /// Number of sweeps that every island gets, whatever its size.
 pub const MIN_SWEEPS: u32 = 25;
@@ -119,6 +124,12 @@ pub trait RowSolver: Send + Sync {
         du: &mut [f64],
         settings: SolverSettings,
     ) -> SolveReport;
+    /// Returns whether islands of robots whose bounds follow the normal forces of contacts, as those of rolling friction do,
+    /// may be solved by Newton's method as a whole instead of by this solver, with bounds held, again and again. False by
+    /// default.
+    fn follows_forces(&self) -> bool {
+        false
+    }
     /// Returns an independent copy.
     fn fork(&self) -> Box<dyn RowSolver>;
 }

@@ -463,7 +463,7 @@ pub(crate) fn row_velocities(threads: &Threads, rows: &Rows, bias: &[f64], u: &[
 }
 
 /// Islands of more blocks share the relaxations of the settings; smaller ones have as many each.
-const OWN_BUDGET: usize = 40;
+pub(super) const OWN_BUDGET: usize = 40;
 
 /// Solves the blocks that satisfy `keep`, island by island, from `work.c` and the warm start in
 /// `work.lambda`; `work.du` receives `Y·λ`. `unit` converts `c` to m/s for the report: 1, or the

@@ -4,7 +4,8 @@
 //! solve: one along the normal, two along the tangents. Their bounds are multiples of the normal forces of
 //! the solution, so the rows are solved again until they no longer change. How friction is divided, between
 //! sliding and spinning and among the directions of rolling, is found from the velocities with the
-//! multipliers of the last step, then once more from those of the first solve.
+//! multipliers of the last step, then once more from those of the first solve. In small islands of robots the bounds follow
+//! the normal forces within a solve (`solver/coupled.rs`): one round for each division, and more only if friction depends on the speed.
 //!
 //! ```text
 //! rolling      |τ_t| ≤ ρ·N                  τ_t = −ρ·N·ω_t/|ω_t| where the pair rolls
@@ -30,6 +31,7 @@
 //! `condim` 4 and 6 in MuJoCo; there rolling shares the same ellipse.
 
 use super::contacts::{Workspace, solve};
+use super::solves::Solves;
 use super::{Moment, contacts};
 use crate::constraint::builder::RowBuilder;
 use crate::constraint::rows::{Block, RowSet, Rows};
@@ -37,7 +39,7 @@ use crate::contact::detect::ContactConstraint;
 use crate::contact::laws::ContactLaws;
 use crate::object::RowTarget;
 use crate::object::collidable::ContactFrame;
-use crate::solver::SolverSettings;
+use crate::solver::{CoupledIsland, Folding, SolveReport, SolverSettings, largest_residual};
 use crate::world::view::ObjectId;
 use crate::world::{Core, StepError};
 use std::ops::Range;
@@ -104,7 +106,8 @@ pub(super) fn solve_patches(
     }
     let tolerance = super::solves::SOLVED * settings.tolerance;
     let mut ray = false;
-    for round in 0..=ROUNDS {
+    let coupled = solve_coupled(core, work, &mut patches, (settings, unit), (keep, blocks));
+    for round in (0..=ROUNDS).take_while(|_| !coupled) {
         let mut change: f64 = 0.0;
         if round < 2 {
             patches.iter_mut().for_each(|patch| divide_friction(work, patch));
@@ -133,6 +136,130 @@ pub(super) fn solve_patches(
     work.rows.len = len;
     [&mut work.bias, &mut work.c, &mut work.lambda].into_iter().for_each(|numbers| numbers.truncate(len));
     Ok(ray)
+}
+
+/// Solves all blocks with bounds that follow the normal forces, if all islands with patches are small ones of robots. Blocks
+/// from `first_row` on are rows of patches. Returns whether it did; if not, `work` is as before except for the sets of rows.
+fn solve_coupled(
+    core: &mut Core,
+    work: &mut Workspace,
+    patches: &mut [Patch],
+    (settings, unit): (SolverSettings, f64),
+    (keep, first_row): (&[bool], usize),
+) -> bool {
+    let all_kept = patches.iter().all(|patch| patch.contacts.clone().all(|i| keep[i]));
+    if !core.solver.follows_forces() || settings.budget.is_some() || !all_kept {
+        return false;
+    }
+    work.islands.build(&work.rows, |b| keep.get(b).copied().unwrap_or(true));
+    let islands = std::mem::take(&mut work.islands);
+    let (has_patch, of_patch) = (|b: &u32| *b as usize >= first_row, |blocks: &&[u32]| !blocks.is_empty());
+    let with_patch = || islands.iter().filter(of_patch).filter(|blocks| blocks.iter().any(has_patch));
+    let folded: Option<Vec<Folding>> =
+        with_patch().map(|blocks| Folding::new(&work.rows, blocks, &work.c, &work.lambda)).collect();
+    let small = folded.as_ref().and_then(|folded| folded.iter().map(CoupledIsland::new).collect::<Option<Vec<_>>>());
+    let others: Vec<&[u32]> = islands.iter().filter(of_patch).filter(|blocks| !blocks.iter().any(has_patch)).collect();
+    let start = (work.lambda.clone(), work.du.clone());
+    let solved = match small {
+        Some(mut small) if others.iter().all(|blocks| blocks.len() <= contacts::OWN_BUDGET) => {
+            let with_patch: Vec<&[u32]> = with_patch().collect();
+            coupled_rounds(core, work, patches, (settings, unit), (&with_patch, &mut small), &others)
+        }
+        _ => None,
+    };
+    match &solved {
+        Some(outcomes) => {
+            let mut solves = Solves::new(&mut core.report, core.solver.as_ref(), unit * settings.tolerance);
+            let mut outcomes = outcomes.iter();
+            for blocks in islands.iter() {
+                let outcome = outcomes.next().filter(|_| !blocks.is_empty());
+                let mut largest = largest_residual(&work.rows, blocks, &work.c, &work.lambda, &work.du);
+                largest.residual *= unit;
+                solves.add(outcome.map(|outcome| (*outcome, largest)));
+            }
+            solves.finish(core.table.with(&core.state.objects), &work.rows, &islands);
+        }
+        None => (work.lambda, work.du) = start,
+    }
+    drop(folded);
+    work.islands = islands;
+    solved.is_some()
+}
+
+/// Solves the islands with patches until the bounds are those of the solution, and the others once. Returns the outcomes of
+/// all islands in their order, or `None` if solves fail.
+fn coupled_rounds(
+    core: &mut Core,
+    work: &mut Workspace,
+    patches: &mut [Patch],
+    (settings, unit): (SolverSettings, f64),
+    (with_patch, small): (&[&[u32]], &mut [CoupledIsland]),
+    others: &[&[u32]],
+) -> Option<Vec<SolveReport>> {
+    let tolerance = super::solves::SOLVED * settings.tolerance;
+    let (mut outcomes, mut failures) = (Vec::<(u32, SolveReport)>::new(), 0);
+    for round in 0..ROUNDS {
+        if round < 2 {
+            patches.iter_mut().for_each(|patch| divide_friction(work, patch));
+        }
+        let change = patches.iter().map(|patch| update(work, patch, unit, 1.0)).fold(0.0, f64::max);
+        let holds = |blocks: &&[u32]| {
+            largest_residual(&work.rows, blocks, &work.c, &work.lambda, &work.du).residual <= settings.tolerance
+        };
+        if round > 0 && (change <= tolerance || with_patch.iter().all(holds)) {
+            outcomes.sort_by_key(|(first, _)| *first);
+            return Some(outcomes.into_iter().map(|(_, outcome)| outcome).collect());
+        }
+        let bounds = bounds_of(work, patches);
+        contacts::zero(&mut work.du, core.dof);
+        let Workspace { rows, c, lambda, du, .. } = &mut *work;
+        for (i, (blocks, island)) in with_patch.iter().zip(&mut *small).enumerate() {
+            island.follow(rows, &bounds);
+            let mut outcome = match island.solve((rows, c), settings.tolerance, lambda, du) {
+                Some(outcome) => outcome,
+                None if failures < with_patch.len() => {
+                    // with the bounds held, which is easier; the next round begins there
+                    failures += 1;
+                    let outcome = core.solver.solve(rows, blocks, c, lambda, du, settings);
+                    island.restart(rows, lambda);
+                    outcome
+                }
+                None => return None,
+            };
+            core.meter.count(outcome.relaxations);
+            match outcomes.get_mut(i) {
+                Some((_, last)) => {
+                    outcome.iterations += last.iterations;
+                    *last = outcome;
+                }
+                None => outcomes.push((blocks[0], outcome)),
+            }
+        }
+        for blocks in others {
+            if round == 0 {
+                let outcome = core.solver.solve(rows, blocks, c, lambda, du, settings);
+                core.meter.count(outcome.relaxations);
+                outcomes.push((blocks[0], outcome));
+            } else {
+                blocks.iter().for_each(|&b| rows.apply_block(&rows.blocks[b as usize], lambda, du));
+            }
+        }
+    }
+    None
+}
+
+/// Returns the block of each row of the patches, with the contacts whose normal forces its bound follows.
+fn bounds_of(work: &Workspace, patches: &[Patch]) -> Vec<(usize, Vec<(usize, f64)>)> {
+    let mut bounds = Vec::new();
+    for patch in patches {
+        let Some(laws) = &work.contact_constraints[patch.contacts.start].laws else { continue };
+        for (b, share) in patch.rolling.into_iter().flatten().zip(patch.directions) {
+            bounds.push((b, patch.contacts.clone().map(|i| (i, share * laws.rolling)).collect()));
+        }
+        let moments = || patch.contacts.clone().zip(patch.divisions.iter().map(|(_, moment)| *moment));
+        bounds.extend(patch.torsional.map(|b| (b, moments().collect())));
+    }
+    bounds
 }
 
 /// Adds the angular rows of all patches, with bounds 0.

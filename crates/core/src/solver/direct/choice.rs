@@ -44,6 +44,8 @@ impl Choice {
 pub(super) struct Point {
     pub lambda: V3,
     pub w: V3,
+    /// Bound of a multiplier that follows normal forces.
+    pub bound: f64,
 }
 
 impl Point {
@@ -51,7 +53,7 @@ impl Point {
     #[inline(always)]
     pub fn choice(&self, block: &LocalBlock) -> Choice {
         let x = self.moved(block);
-        let Some((lo, hi)) = block.kind.bounds() else {
+        let Some((lo, hi)) = self.bounds(block) else {
             return match block.kind {
                 Kind::Cone { .. } if x[0] <= 0.0 => Choice::Open,
                 Kind::Cone { mu } if length(x[1], x[2]) > mu * x[0] => Choice::Slide,
@@ -66,6 +68,37 @@ impl Point {
         }
     }
 
+    /// Appends the other choices of a block, each with its distance: the velocity by which the point would have to
+    /// change to ask for it.
+    pub fn others(&self, block: &LocalBlock, mut add: impl FnMut(f64, Choice)) {
+        let (x, d) = (self.moved(block), block.diagonal);
+        let now = self.choice(block);
+        if let Kind::Cone { mu } = block.kind {
+            let (opening, friction) = (d * x[0].abs(), d * (length(x[1], x[2]) - mu * x[0]).abs());
+            for choice in [Choice::Open, Choice::Free, Choice::Slide].into_iter().filter(|c| *c != now) {
+                let opens = choice == Choice::Open || now == Choice::Open;
+                add(if opens { opening } else { friction }, choice);
+            }
+        }
+        let Some((lo, hi)) = self.bounds(block) else { return };
+        for (choice, bound) in [(Choice::Low, lo), (Choice::High, hi)].into_iter().filter(|(_, b)| b.is_finite()) {
+            match now {
+                Choice::Free => add(d * (x[0] - bound).abs(), choice),
+                _ if now == choice => add(d * (x[0] - bound).abs(), Choice::Free),
+                _ => {}
+            }
+        }
+    }
+
+    /// Returns the bounds of the multiplier of a scalar row that has any.
+    #[inline(always)]
+    fn bounds(&self, block: &LocalBlock) -> Option<(f64, f64)> {
+        match block.bound {
+            Some(_) => Some((-self.bound, self.bound)),
+            None => block.kind.bounds(),
+        }
+    }
+
     /// Returns the multipliers that a choice asks for.
     #[inline(always)]
     pub fn target(&self, block: &LocalBlock, choice: Choice) -> V3 {
@@ -77,8 +110,8 @@ impl Point {
                 let share = mu * x[0] / length(x[1], x[2]);
                 [x[0], share * x[1], share * x[2]]
             }
-            (Choice::Low, kind) => [kind.bounds().map_or(x[0], |(lo, _)| lo), 0.0, 0.0],
-            (Choice::High, kind) => [kind.bounds().map_or(x[0], |(_, hi)| hi), 0.0, 0.0],
+            (Choice::Low, _) => [self.bounds(block).map_or(x[0], |(lo, _)| lo), 0.0, 0.0],
+            (Choice::High, _) => [self.bounds(block).map_or(x[0], |(_, hi)| hi), 0.0, 0.0],
             (_, Kind::Cone { .. }) => x,
             _ => [x[0], 0.0, 0.0],
         }

@@ -37,8 +37,11 @@ pub(super) enum Kind {
 }
 
 /// A block of the island.
+#[derive(Clone, Copy)]
 pub(super) struct LocalBlock<'a> {
     pub kind: Kind,
+    /// The bound of the multiplier that follows normal forces (`newton.rs`), in the place of those of `kind`.
+    pub bound: Option<u32>,
     /// Number of rows.
     pub rows: usize,
     /// First row in the multipliers of the island.
@@ -58,6 +61,11 @@ impl LocalBlock<'_> {
 
     pub fn range(&self) -> std::ops::Range<usize> {
         self.row..self.row + self.rows
+    }
+
+    /// Returns the block with a multiplier within ± `bound`.
+    pub fn within(self, bound: f64) -> Self {
+        LocalBlock { kind: Kind::Interval { lo: -bound, hi: bound }, ..self }
     }
 }
 
@@ -139,6 +147,7 @@ impl<'a> Island<'a> {
         };
         LocalBlock {
             kind,
+            bound: None,
             rows: count,
             row: self.c.len(),
             compliance: block.compliance,

@@ -76,6 +76,11 @@ impl Multipliers {
         }
     }
 
+    /// Returns the rank of the island.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
     /// Improves multipliers by `outer` outer steps with `ε = epsilon`; those have `error`, and `goal` is to be reached.
     /// Returns the number of factorizations.
     pub fn improve(
@@ -139,7 +144,8 @@ impl Multipliers {
             let shift = if k == 0 { self.shift[i] } else { 0.0 };
             *x = self.center[block.row + k] - (w(block.row + k) + shift) / soft;
         }
-        let scalar = |value: f64, free: bool| ([value, 0.0, 0.0], [[f64::from(u8::from(free)), 0.0, 0.0], [0.0; 3], [0.0; 3]]);
+        let scalar =
+            |value: f64, free: bool| ([value, 0.0, 0.0], [[f64::from(u8::from(free)), 0.0, 0.0], [0.0; 3], [0.0; 3]]);
         match (block.kind, block.kind.bounds()) {
             (Kind::Cone { mu }, _) => project(x, mu),
             (Kind::Held, _) => scalar(self.center[block.row], false),
@@ -243,5 +249,34 @@ impl Multipliers {
             if now > 0.0 { high = (t, now) } else { low = (t, now) }
         }
         t
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Island, Multipliers};
+    use crate::constraint::rows::{RowSet, Rows};
+
+    /// Two contacts at one place: from nothing, each takes half of the force, sticking or sliding.
+    #[test]
+    fn redundant_contacts_share_the_force() {
+        for (slip, friction) in [(0.2, 0.1), (5.0, 0.15)] {
+            let mut rows = Rows::default();
+            rows.clear(3);
+            for _ in 0..2 {
+                rows.push_block(RowSet::Cone { mu: 0.3 });
+                let y = rows.side(0, 3).expect("first side");
+                (0..3).for_each(|k| y[k * 3 + k] = 1.0);
+            }
+            let c = [-1.0, slip, 0.0, -1.0, slip, 0.0];
+            let (island, k) = (Island::new(&rows, &[0, 1], &c), rows.dense(&[0, 1]));
+            let mut lambda = [0.0; 6];
+            let taken = Multipliers::new(&island, &k).improve(&island, &mut lambda, (1e-5, 6), (1.0, 1e-12));
+            assert!((1..=40).contains(&taken), "{taken}");
+            for of_one in lambda.chunks_exact(3) {
+                let error = (of_one[0] - 0.5).abs() + (of_one[1] + friction).abs() + of_one[2].abs();
+                assert!(error < 1e-6, "{lambda:?}");
+            }
+        }
     }
 }

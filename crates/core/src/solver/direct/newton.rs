@@ -5,6 +5,8 @@
 //! f(λ, w) = 0,    w = c + (K + R)·λ
 //! open, low, high:     (1 + ε)·d·δλ = −f
 //! free, slide:         (∂f/∂λ + ε·d + ∂f/∂w·(K + R))·δλ = −f
+//! bounds that follow normal forces,  −b ≤ λ ≤ b,  b = Σ aᵢ·λ_ni:
+//! low, high            (1 + ε)·d·δλ ± d·Σ aᵢ·δλ_ni = −f
 //! ```
 //!
 //! | symbol | meaning |
@@ -16,11 +18,14 @@
 //! and a line search along `|f|` accepts some steps uphill. Four feet of a robot with friction press each other through
 //! its joints, two contacts of a foot are redundant, and then the choices may go in circles. A second attempt after ten
 //! sweeps alternates with the method of multipliers (`multipliers.rs`), which finds the choices that Newton's method
-//! makes exact. Other methods solve the rest.
+//! makes exact. Before that, of islands with few redundant rows, or after it, of others, the choices are *held*: those of
+//! the multipliers that are there, then each with one block changed, in the order of how near the block is to that change.
+//! Feet that are braced against each other need that: there `|f|` has minima that are no solutions. Other methods solve
+//! the rest.
 
 use super::choice::{Choice, Derivative, Point};
 use super::dense;
-use super::island::{Island, LocalBlock, largest};
+use super::island::{Island, Kind, LocalBlock, largest};
 use super::multipliers::Multipliers;
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, multiply};
@@ -31,14 +36,21 @@ const MAX_ROWS: (usize, usize) = (128, 768);
 /// Degrees of freedom of a wide object, such as a cloth.
 const WIDE: u32 = 256;
 /// Maximum number of steps of a first attempt, of a second one, and after each turn of the method of multipliers.
-const STEPS: [u32; 3] = [12, 6, 4];
+const STEPS: [u32; 3] = [12, 2, 4];
 /// Maximum number of turns of the method of multipliers, and of its outer steps in one.
-const TURNS: (i32, u32) = (10, 2);
+const TURNS: (i32, u32) = (6, 2);
 /// Its `ε` in the first turn, ratio of the following ones, and bound.
 const PENALTY: [f64; 3] = [1e-5, 0.1, 1e-7];
 /// `ε`: least, first after a step that failed, growth and bound. With less, redundant contacts that disagree by rounding get
 /// forces of any size.
 const REGULAR: [f64; 4] = [1e-7, 1e-5, 100.0, 0.1];
+/// Maximum number of steps with choices that are held, their `ε`, and the number of single changes that are tried.
+const HELD_STEPS: u32 = 6;
+const HELD: f64 = 1e-13;
+const CHANGES: usize = 10;
+/// Choices are held before the method of multipliers is tried, and not after it, if there are at most this number of rows for each
+/// of the island's rank: then contacts are seldom redundant.
+const BRACED: f64 = 1.25;
 /// First `ε` where more rows are coupled than the island has velocities: without it the step has no bound.
 const REDUNDANT: f64 = 1e-4;
 /// A step is accepted if `|f|` falls below the largest of this number of last iterates: the way to the right choices
@@ -53,6 +65,8 @@ pub(in crate::solver) struct SmallIsland<'a> {
     island: Island<'a>,
     /// `K + R`, row-major.
     k: Vec<f64>,
+    /// Rows of the normal forces that each bound follows, with the factors `a`.
+    bounds: Vec<Vec<(usize, f64)>>,
     memory: Memory,
 }
 
@@ -66,6 +80,8 @@ struct Memory {
     stretches: Vec<[usize; 2]>,
     /// `(K + R)·δλ` of the rows that are not coupled.
     pulled: Vec<f64>,
+    /// Place of each row among the coupled ones; filled if bounds follow normal forces.
+    places: Vec<Option<usize>>,
 }
 
 /// Multipliers and row velocities of the island.
@@ -73,12 +89,15 @@ struct Memory {
 struct Iterate {
     lambda: Vec<f64>,
     w: Vec<f64>,
+    /// Bounds that follow normal forces; negative ones count as 0.
+    bounds: Vec<f64>,
 }
 
 impl Iterate {
     #[inline(always)]
     fn point(&self, block: &LocalBlock) -> Point {
-        let mut point = Point::default();
+        let bound = block.bound.map_or(0.0, |bound| self.bounds[bound as usize].max(0.0));
+        let mut point = Point { bound, ..Point::default() };
         point.lambda[..block.rows].copy_from_slice(&self.lambda[block.range()]);
         point.w[..block.rows].copy_from_slice(&self.w[block.range()]);
         point
@@ -87,14 +106,17 @@ impl Iterate {
     /// Returns a block after `t` of a change.
     #[inline(always)]
     fn point_along(&self, change: &Iterate, t: f64, block: &LocalBlock) -> Point {
+        let along = |bound: u32| self.bounds[bound as usize] + t * change.bounds[bound as usize];
+        let bound = block.bound.map_or(0.0, |bound| along(bound).max(0.0));
         let (at, change) = (self.point(block), change.point(block));
         let add = |x: [f64; 3], d: [f64; 3]| [0, 1, 2].map(|k| x[k] + t * d[k]);
-        Point { lambda: add(at.lambda, change.lambda), w: add(at.w, change.w) }
+        Point { lambda: add(at.lambda, change.lambda), w: add(at.w, change.w), bound }
     }
 
     fn advance(&mut self, change: &Iterate, t: f64) {
         self.lambda.iter_mut().zip(&change.lambda).for_each(|(x, d)| *x += t * d);
         self.w.iter_mut().zip(&change.w).for_each(|(x, d)| *x += t * d);
+        self.bounds.iter_mut().zip(&change.bounds).for_each(|(x, d)| *x += t * d);
     }
 }
 
@@ -121,7 +143,36 @@ impl<'a> SmallIsland<'a> {
         let count: usize = blocks.iter().map(|&b| rows.blocks[b as usize].set.rows()).sum();
         let island = || Island::new(rows, blocks, c);
         let most = if is_wide(rows, blocks) { MAX_ROWS.1 } else { MAX_ROWS.0 };
-        (count <= most).then(|| SmallIsland { island: island(), k: rows.dense(blocks), memory: Memory::default() })
+        (count <= most).then(|| SmallIsland {
+            island: island(),
+            k: rows.dense(blocks),
+            bounds: Vec::new(),
+            memory: Memory::default(),
+        })
+    }
+
+    /// Sets the number of bounds that follow normal forces.
+    pub fn set_bounds(&mut self, count: usize) {
+        self.bounds.resize(count, Vec::new());
+    }
+
+    /// Sets the bound of a block, which follows the normal forces of other blocks with the factors `a`. Its present
+    /// value is `now`.
+    pub fn bind(&mut self, bound: usize, block: usize, now: f64, loads: impl Iterator<Item = (usize, f64)>) {
+        let blocks = &mut self.island.blocks;
+        self.bounds[bound].clear();
+        self.bounds[bound].extend(loads.map(|(block, factor)| (blocks[block].row, factor)));
+        if blocks[block].diagonal > f64::MIN_POSITIVE {
+            (blocks[block].bound, blocks[block].kind) = (Some(bound as u32), Kind::Interval { lo: -now, hi: now });
+        }
+    }
+
+    /// Sets the friction coefficient of a contact.
+    pub fn set_friction(&mut self, block: usize, mu: f64) {
+        let kind = &mut self.island.blocks[block].kind;
+        if *kind != Kind::Held {
+            *kind = if mu > 0.0 { Kind::Cone { mu } } else { Kind::HalfLine };
+        }
     }
 
     /// Returns the cost of a step in sweeps, at most.
@@ -130,7 +181,7 @@ impl<'a> SmallIsland<'a> {
     }
 
     /// Solves from the multipliers in `lambda`, and replaces them if it finds better ones. If `thorough`, the method of
-    /// multipliers helps where the choices that follow the iterate fail.
+    /// multipliers helps where the choices that follow the iterate fail; bounds that follow normal forces must not be there then.
     pub fn solve(&mut self, lambda: &mut [f64], tolerance: f64, thorough: bool) -> Direct {
         let tolerance = self.island.tolerance(tolerance);
         let own = self.island.read(lambda);
@@ -139,8 +190,18 @@ impl<'a> SmallIsland<'a> {
         let mut best = Best { lambda: own, other: Iterate::default(), error, taken: 0, tolerance };
         self.follow(start, &mut best, STEPS[usize::from(thorough)]);
         if thorough && !best.is_solved() && best.error.is_finite() {
-            let first = self.island.read(lambda);
-            self.alternate(&mut best, first);
+            let method = Multipliers::new(&self.island, &self.k);
+            let braced = self.island.c.len() as f64 <= BRACED * method.rank() as f64;
+            if braced {
+                self.hold(&mut best);
+            }
+            if !best.is_solved() {
+                let first = self.island.read(lambda);
+                self.alternate(&mut best, first, method);
+            }
+            if !braced && !best.is_solved() {
+                self.hold(&mut best);
+            }
         }
         if best.error < error {
             self.island.write(&best.lambda, lambda);
@@ -191,8 +252,7 @@ impl<'a> SmallIsland<'a> {
     }
 
     /// Alternates between the method of multipliers and steps from what it finds.
-    fn alternate(&mut self, best: &mut Best, start: Vec<f64>) {
-        let (mut lambda, mut method) = (start, Multipliers::new(&self.island, &self.k));
+    fn alternate(&mut self, best: &mut Best, mut lambda: Vec<f64>, mut method: Multipliers) {
         let mut error = best.error;
         for turn in 0..TURNS.0 {
             let epsilon = (PENALTY[0] * PENALTY[1].powi(turn)).max(PENALTY[2]);
@@ -209,6 +269,49 @@ impl<'a> SmallIsland<'a> {
             if !best.is_solved() {
                 self.follow(at, best, STEPS[2]);
             }
+            if best.is_solved() {
+                return;
+            }
+        }
+    }
+
+    /// Tries the choices of the best multipliers, and those with one block changed.
+    fn hold(&mut self, best: &mut Best) {
+        let start = self.at(best.lambda.clone());
+        let (mut choices, mut changes) = (Vec::new(), Vec::new());
+        self.choose(&start, &mut choices);
+        for (i, block) in self.island.blocks.iter().enumerate() {
+            start.point(block).others(block, |distance, choice| changes.push((distance, i, choice)));
+        }
+        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.follow_held(start.clone(), &choices, best);
+        for (_, i, choice) in changes.into_iter().take(CHANGES) {
+            if best.is_solved() {
+                return;
+            }
+            let before = std::mem::replace(&mut choices[i], choice);
+            self.follow_held(start.clone(), &choices, best);
+            choices[i] = before;
+        }
+    }
+
+    /// Takes steps with the choices held.
+    fn follow_held(&mut self, mut at: Iterate, choices: &[Choice], best: &mut Best) {
+        let (mut last, mut change) = (f64::INFINITY, Iterate::default());
+        let mut rises = 0;
+        for _ in 0..HELD_STEPS {
+            let size = self.size_held(&at, choices);
+            rises += u32::from(size >= last);
+            if !size.is_finite() || rises > 2 {
+                return;
+            }
+            last = size;
+            if !self.change(&at, choices, HELD, &mut change) {
+                return;
+            }
+            best.taken += 1;
+            at.advance(&change, 1.0);
+            self.consider(&at, choices, best);
             if best.is_solved() {
                 return;
             }
@@ -232,7 +335,7 @@ impl<'a> SmallIsland<'a> {
     }
 
     fn at(&self, lambda: Vec<f64>) -> Iterate {
-        let mut at = Iterate { lambda, w: Vec::new() };
+        let mut at = Iterate { lambda, ..Iterate::default() };
         self.move_rows(&mut at);
         at
     }
@@ -243,16 +346,21 @@ impl<'a> SmallIsland<'a> {
         at.w.iter_mut().zip(&self.island.c).for_each(|(w, c)| *w += c);
     }
 
-    /// Writes `(K + R)·λ`.
-    fn multiply(&self, Iterate { lambda, w }: &mut Iterate) {
+    /// Writes `(K + R)·λ` and the bounds that follow normal forces.
+    fn multiply(&self, Iterate { lambda, w, bounds }: &mut Iterate) {
         w.resize(lambda.len(), 0.0);
         multiply(&self.k, lambda, w);
+        bounds.clear();
+        bounds.extend(self.bounds.iter().map(|loads| loads.iter().map(|(row, a)| a * lambda[*row]).sum::<f64>()));
     }
 
     fn error(&self, at: &Iterate) -> f64 {
         let error = |block: &LocalBlock| {
             let point = at.point(block);
-            self.island.block_error(block, point.w, &point.lambda)
+            match block.bound {
+                Some(_) => self.island.block_error(&block.within(point.bound), point.w, &point.lambda),
+                None => self.island.block_error(block, point.w, &point.lambda),
+            }
         };
         largest(self.island.blocks.iter().map(error))
     }
@@ -274,17 +382,27 @@ impl<'a> SmallIsland<'a> {
         self.island.blocks.iter().map(square).sum::<f64>().sqrt()
     }
 
+    /// Returns `|f|` with choices that are held.
+    fn size_held(&self, at: &Iterate, choices: &[Choice]) -> f64 {
+        let square = |(block, choice): (&LocalBlock, &Choice)| {
+            let f = at.point(block).function(block, *choice);
+            f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
+        };
+        self.island.blocks.iter().zip(choices).map(square).sum::<f64>().sqrt()
+    }
+
     /// Writes the change that makes the linearized function 0. Returns whether there is one.
     fn change(&mut self, at: &Iterate, choices: &[Choice], epsilon: f64, change: &mut Iterate) -> bool {
-        let Memory { coupled, stretches, matrix, right, pulled } = &mut self.memory;
+        let Memory { coupled, stretches, matrix, right, pulled, places } = &mut self.memory;
         let (island, k, count) = (&self.island, &self.k, self.island.c.len());
         let lambda = &mut change.lambda;
         lambda.clear();
         lambda.resize(count, 0.0);
         coupled.clear();
         stretches.clear();
+        let is_coupled = |block: &LocalBlock, choice: &Choice| choice.is_coupled() || block.bound.is_some();
         for (block, choice) in island.blocks.iter().zip(choices) {
-            if choice.is_coupled() {
+            if is_coupled(block, choice) {
                 coupled.extend(block.range());
                 match stretches.last_mut() {
                     Some([first, len]) if *first + *len == block.row => *len += block.rows,
@@ -305,10 +423,31 @@ impl<'a> SmallIsland<'a> {
         if lambda.iter().any(|x| *x != 0.0) {
             multiply(k, lambda, pulled);
         }
+        if !self.bounds.is_empty() {
+            places.clear();
+            places.resize(count, None);
+            coupled.iter().enumerate().for_each(|(place, &row)| places[row] = Some(place));
+        }
         let mut first = 0;
-        for (block, choice) in island.blocks.iter().zip(choices).filter(|(_, choice)| choice.is_coupled()) {
+        for (block, choice) in island.blocks.iter().zip(choices).filter(|(block, choice)| is_coupled(block, choice)) {
             let point = at.point(block);
             let f = point.function(block, *choice);
+            if let Some(bound) = block.bound.filter(|_| !choice.is_coupled()) {
+                let row = &mut matrix[first * n..][..n];
+                let d = block.diagonal.max(f64::MIN_POSITIVE);
+                row[first] = (1.0 + epsilon) * d;
+                let (mut known, sign) = (-f[0], if *choice == Choice::Low { 1.0 } else { -1.0 });
+                let follows = at.bounds[bound as usize] > 0.0;
+                for &(of, a) in self.bounds[bound as usize].iter().filter(|_| follows) {
+                    match places[of] {
+                        Some(place) => row[place] += sign * d * a,
+                        None => known -= sign * d * a * lambda[of],
+                    }
+                }
+                right.push(known);
+                first += 1;
+                continue;
+            }
             let Derivative { by_lambda, by_w } = Derivative::new(block, &point, *choice);
             let pulls = [0, 1, 2].map(|i| if i < block.rows { pulled[block.row + i] } else { 0.0 });
             for i in 0..block.rows {
@@ -342,4 +481,33 @@ impl<'a> SmallIsland<'a> {
 /// Returns whether an island has a wide object.
 pub(in crate::solver) fn is_wide(rows: &Rows, blocks: &[u32]) -> bool {
     blocks.iter().flat_map(|&b| rows.blocks[b as usize].sides()).any(|side| side.dof >= WIDE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SmallIsland;
+    use crate::constraint::rows::{RowSet, Rows};
+
+    /// A contact that presses, with a row that turns it: the moment is a fifth of the normal force, and moves the contact.
+    #[test]
+    fn a_bound_follows_the_normal_force_of_the_same_solution() {
+        for sign in [1.0, -1.0] {
+            let mut rows = Rows::default();
+            rows.clear(4);
+            rows.push_block(RowSet::Cone { mu: 0.5 });
+            let y = rows.side(0, 4).expect("first side");
+            (0..3).for_each(|k| y[k * 4 + k] = 1.0);
+            rows.push_block(RowSet::Interval { lo: 0.0, hi: 0.0 });
+            rows.side(0, 4).expect("first side").copy_from_slice(&[0.3, 0.0, 0.0, 1.0]);
+            let mut island = SmallIsland::new(&rows, &[0, 1], &[-1.0, 0.0, 0.0, -5.0 * sign]).expect("small");
+            island.set_bounds(1);
+            island.bind(0, 1, 0.0, std::iter::once((0, 0.2)));
+            let mut lambda = [0.0; 4];
+            assert!(island.solve(&mut lambda, 1e-12, false).converged);
+            // w_n = −1 + λ_n + 0.3·τ = 0,  τ = ±0.2·λ_n
+            let normal = 1.0 / (1.0 + sign * 0.06);
+            assert!((lambda[0] - normal).abs() < 1e-11, "{lambda:?}");
+            assert!((lambda[3] - sign * 0.2 * normal).abs() < 1e-11, "{lambda:?}");
+        }
+    }
 }
