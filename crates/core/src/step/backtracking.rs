@@ -265,7 +265,6 @@ impl Backtracking {
                 limits: Limits::Free,
                 recovery: core.settings.recovery_speed * left,
                 tolerance: 1e-2 * core.settings.contact_tolerance,
-                effort: 1,
             };
             correction::correct(core, None, &mut self.work, &mut self.probe, &options)?;
             core.integration().refresh();
@@ -585,7 +584,6 @@ impl Backtracking {
             limits: Limits::Listed { limits: &self.held, reach: core.settings.drift_tolerance },
             recovery: core.settings.recovery_speed * left,
             tolerance: core.settings.contact_tolerance,
-            effort: 1,
         };
         correction::correct(core, None, &mut self.work, &mut self.probe, &options)
     }

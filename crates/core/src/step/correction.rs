@@ -93,8 +93,6 @@ pub(super) struct Options<'a> {
     /// An island whose contacts and limits are violated by no more than this is left alone, m or
     /// rad.
     pub tolerance: f64,
-    /// Factor of the number of sweeps that remove overlap.
-    pub effort: u32,
 }
 
 /// Returns whether a row is a joint, whose position is kept.

@@ -105,7 +105,7 @@ pub(super) fn separate(
         let jointed = blocks.iter().any(|&b| b as usize >= contacts);
         let min_sweeps = if jointed { core.settings.solver_settings.max_sweeps } else { 0 };
         let solver_settings = SolverSettings {
-            max_sweeps: core.settings.projection_sweeps.saturating_mul(options.effort).max(min_sweeps),
+            max_sweeps: core.settings.projection_sweeps.max(min_sweeps),
             max_relaxations: u32::MAX,
             tolerance: 0.1 * least / h,
             budget: None,

@@ -38,10 +38,7 @@ use crate::world::{Core, StepError};
 use tumble_collide::Shape;
 
 /// Maximum number of corrections of overlap that the rows of the step do not see.
-const ROUNDS: u32 = 2;
-/// Sweeps of one of them, in [`Settings::projection_sweeps`](crate::Settings): another sweep costs less than to find the contacts
-/// again.
-const EFFORT: u32 = 2;
+const ROUNDS: u32 = 3;
 /// Distance within which a correction looks for contacts at first, in drift tolerances.
 const FIRST_REACH: f64 = 10.0;
 /// Least such distance in deepest overlaps: two bodies may be pushed towards each other, each as far.
@@ -88,7 +85,6 @@ impl TimeStepping {
             limits: Limits::Violated,
             recovery: core.settings.recovery_speed * h,
             tolerance: core.settings.contact_tolerance,
-            effort: 1,
         };
         correction::correct(core, Some(middle), work, &mut self.probe, &options)?;
         self.buffers.moved.clone_from(&self.work.frictionless.du);
@@ -143,7 +139,6 @@ impl TimeStepping {
                 limits: Limits::Free,
                 recovery: f64::INFINITY,
                 tolerance: core.settings.contact_tolerance,
-                effort: EFFORT,
             };
             core.table.walk.parts.copy(&core.derived.part_states, &mut self.before);
             self.end.frictionless.du.clear();
