@@ -21,11 +21,16 @@
 //! stays. The plane of `B₁` carries `A` across the seam. A wall that stands on `B₁` protrudes and
 //! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
 //! `flush`.
+//!
+//! Shapes of a compound may have filters of their own. `B₁` and `B₂` are then those shapes of theirs that the touching shape of
+//! `A` meets, and the nearest contact is one of a shape of `A` with the same filter: what `A` passes through hides nothing.
 
 use crate::contact::coplanar::PlaneContacts;
 use crate::contact::detect::{ContactConstraint, Owner};
 use crate::object::part_state::PartState;
+use crate::object::{FilteredPart, ShapeFilter};
 use crate::world::view::Objects;
+use std::borrow::Cow;
 use tumble_collide::{Shape, SurfacePoint, Vec3, closest_point_within};
 
 /// Height above the plane at which `B₂` must be absent, in drift tolerances.
@@ -49,7 +54,7 @@ pub(crate) struct InternalEdges {
     /// Start of the entries of each part, and the entries: contacts of a moving part.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    /// The nearest contact with each other part.
+    /// The nearest contact with each other part, of the shapes with each filter.
     nearest: Vec<Entry>,
     /// The contacts of a part, nearest first.
     order: Vec<Entry>,
@@ -63,6 +68,11 @@ pub(crate) struct InternalEdges {
 #[derive(Clone, Copy)]
 pub(crate) struct Entry {
     pub contact: u32,
+    /// The row of `A`, and its shape that touches.
+    pub part: u32,
+    pub shape: u32,
+    /// The filter of that shape; `None` for that of the body.
+    pub filter: Option<ShapeFilter>,
     /// The row of the other part.
     pub other: u32,
     pub gap: f64,
@@ -76,9 +86,10 @@ impl Entry {
     /// Returns a contact as seen by its first or second part.
     fn new(contact: u32, constraint: &ContactConstraint, second: bool) -> Entry {
         let c = &constraint.contact;
-        let (sign, other) = if second { (-1.0, constraint.a) } else { (1.0, constraint.b) };
-        let normal = sign * c.normal;
-        Entry { contact, other, gap: c.gap, normal, point: c.point - normal * (0.5 * c.gap) }
+        let (sign, [other, part]) =
+            if second { (-1.0, [constraint.a, constraint.b]) } else { (1.0, [constraint.b, constraint.a]) };
+        let (normal, shape) = (sign * c.normal, c.shapes[usize::from(second)]);
+        Entry { contact, part, shape, filter: None, other, gap: c.gap, normal, point: c.point - normal * (0.5 * c.gap) }
     }
 }
 
@@ -94,12 +105,19 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Returns the shape of a part; `None` also for one whose shapes have filters of their own, since another part may meet only
-    /// some of them.
-    pub fn shape(&self, part: u32) -> Option<&Shape> {
+    fn part(&self, part: u32) -> Option<FilteredPart<'_>> {
         let owner = &self.owners[part as usize];
-        let (body, part) = (self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize);
-        body.shape(part).filter(|_| body.shape_filters(part).is_empty())
+        FilteredPart::of(self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize)
+    }
+
+    /// Returns the shape of a part.
+    pub fn shape(&self, part: u32) -> Option<&Shape> {
+        Some(self.part(part)?.shape)
+    }
+
+    /// Returns those shapes of the other part of an entry that its own shape meets.
+    fn met(&self, entry: &Entry, other: u32) -> Option<Cow<'_, Shape>> {
+        self.part(other)?.meeting_shape(&self.part(entry.part)?, entry.shape)
     }
 
     fn moves(&self, part: u32) -> bool {
@@ -108,10 +126,10 @@ impl Surroundings<'_> {
         entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(owner.part as usize))
     }
 
-    /// Returns the point of a part's surface that is closest to a point; `None` if it is more than
-    /// `limit` away, m.
-    pub fn closest(&self, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
-        let shape = self.shape(part)?;
+    /// Returns the point that is closest to a point, on the surface of those shapes of a part that the own shape of an entry
+    /// meets; `None` if it is more than `limit` away, m.
+    pub fn closest(&self, entry: &Entry, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+        let shape = &*self.met(entry, part)?;
         let pose = &self.part_states[part as usize].pose;
         let reach = shape.bounding_radius() + limit;
         if (point - pose.translation.vector).norm_squared() > reach * reach {
@@ -132,16 +150,16 @@ impl Surroundings<'_> {
         // manifolds extend a little beyond a face; a point outside is moved to the surface
         let overhang = MAX_OVERHANG * self.shape(c.other).map_or(0.0, Shape::bounding_radius);
         let height = |point: &Vec3| first.normal.dot(&(point - first.point));
-        if height(&c.point) > overhang || self.closest(first.other, &c.point, tolerance + overhang).is_none() {
+        if height(&c.point) > overhang || self.closest(c, first.other, &c.point, tolerance + overhang).is_none() {
             return false;
         }
-        let Some(surface) = self.closest(c.other, &c.point, f64::INFINITY) else { return false };
+        let Some(surface) = self.closest(c, c.other, &c.point, f64::INFINITY) else { return false };
         let point = if surface.distance > 0.0 { surface.point } else { c.point };
-        if height(&point) > FLUSH * lift || self.closest(first.other, &point, tolerance).is_none() {
+        if height(&point) > FLUSH * lift || self.closest(c, first.other, &point, tolerance).is_none() {
             return false;
         }
         let above = point + first.normal * (lift - height(&point));
-        self.closest(c.other, &above, (1.0 - FLUSH) * lift).is_none()
+        self.closest(c, c.other, &above, (1.0 - FLUSH) * lift).is_none()
     }
 }
 
@@ -162,11 +180,17 @@ impl InternalEdges {
             }
             // contacts are ordered by pair
             self.nearest.clear();
-            self.nearest.extend(
-                entries
-                    .chunk_by(|x, y| x.other == y.other)
-                    .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
-            );
+            for same in entries.chunk_by(|x, y| x.other == y.other) {
+                let start = self.nearest.len();
+                for entry in same {
+                    let alike = |known: &&mut Entry| known.filter == entry.filter;
+                    match self.nearest[start..].iter_mut().find(alike) {
+                        Some(known) if known.gap.total_cmp(&entry.gap).is_gt() => *known = *entry,
+                        Some(_) => {}
+                        None => self.nearest.push(*entry),
+                    }
+                }
+            }
             self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
             if let Some(plane) = PlaneContacts::find(around, (entries, &self.nearest), contacts) {
                 let replaced = entries.iter().filter(|e| plane.tiles.contains(&e.other));
@@ -185,7 +209,7 @@ impl InternalEdges {
                 let internal = |first: &&Entry| {
                     let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
                     let mutual = level && self.removed_by[first.contact as usize] == Some(c.other);
-                    first.other != c.other && !mutual && around.is_internal(c, first)
+                    first.other != c.other && first.filter == c.filter && !mutual && around.is_internal(c, first)
                 };
                 if let Some(first) = self.nearest.iter().find(internal) {
                     self.removed_by[c.contact as usize] = Some(first.other);
@@ -229,14 +253,25 @@ impl InternalEdges {
             *start = end;
         }
         self.starts[around.owners.len()] = end;
-        let empty = Entry { contact: 0, other: 0, gap: 0.0, normal: Vec3::zeros(), point: Vec3::zeros() };
+        let empty = Entry {
+            contact: 0,
+            part: 0,
+            shape: 0,
+            filter: None,
+            other: 0,
+            gap: 0.0,
+            normal: Vec3::zeros(),
+            point: Vec3::zeros(),
+        };
         self.entries.clear();
         self.entries.resize(end as usize, empty);
         // and from the last contact back to their starts
         for index in (0..contacts.len()).rev() {
             if let Some((part, second)) = seen(index) {
                 self.starts[part as usize] -= 1;
-                self.entries[self.starts[part as usize] as usize] = Entry::new(index as u32, &contacts[index], second);
+                let mut entry = Entry::new(index as u32, &contacts[index], second);
+                entry.filter = around.part(part).and_then(|part| part.filter_of(entry.shape));
+                self.entries[self.starts[part as usize] as usize] = entry;
             }
         }
     }

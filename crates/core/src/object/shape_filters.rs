@@ -110,6 +110,12 @@ impl<'a> FilteredPart<'a> {
         Some([a?, b?])
     }
 
+    /// Returns the filter of one shape; `None` for that of the body.
+    pub fn filter_of(&self, shape: u32) -> Option<ShapeFilter> {
+        let own = self.body.shape_filters(self.part);
+        own.iter().find(|(n, _)| *n == shape as usize).map(|(_, filter)| *filter)
+    }
+
     fn whole(&self) -> FilterClass {
         FilterClass { filter: None, parts: Vec::new() }
     }
@@ -182,7 +188,7 @@ impl<'a> FilteredPart<'a> {
             .collect()
     }
 
-    /// Returns its shapes that a sensor, one of another part, reports.
+    /// Returns its solid shapes that collide with those of a class of another part: what a sensor of it reports.
     pub fn sensed_by(&self, sensor: &FilteredPart<'_>, class: &FilterClass) -> Option<Cow<'a, Shape>> {
         let group = class.group(sensor.body, sensor.part);
         self.shape_if(|own| {
@@ -190,6 +196,14 @@ impl<'a> FilteredPart<'a> {
                 && own.collides_with(self.body, self.part, group)
                 && class.collides_with(sensor.body, sensor.part, own.group(self.body, self.part))
         })
+    }
+
+    /// Returns its shapes that have contacts with one shape of another part.
+    pub fn meeting_shape(&self, other: &FilteredPart<'_>, shape: u32) -> Option<Cow<'a, Shape>> {
+        if self.body.shape_filters(self.part).is_empty() && other.body.shape_filters(other.part).is_empty() {
+            return Some(Cow::Borrowed(self.shape));
+        }
+        self.sensed_by(other, &FilterClass { filter: other.filter_of(shape), parts: Vec::new() })
     }
 
     /// Returns the shapes of this part and another that have contacts with each other: one pair for nearly all parts, several if both

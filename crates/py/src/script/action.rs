@@ -102,7 +102,7 @@ impl Action {
     ) -> Result<Action> {
         let velocity = vec3_or(velocity, "velocity", Vec3::zeros())?;
         let angular_velocity = vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?;
-        Ok(Action { deed: Deed::Velocity { body: subject(body), velocity, angular_velocity } })
+        Ok(Action { deed: Deed::SetVelocity { body: subject(body), velocity, angular_velocity } })
     }
 
     /// Disables a body. A body of a template can be spawned again.
@@ -171,7 +171,7 @@ impl Action {
         let frames: Vec<Keyframe> = (0..n).map(frame).collect();
         let (smoothness, ends) = (meaning("smoothness", smoothness, SMOOTHNESS)?, meaning("ends", ends, ENDS)?);
         let path = Spline::new(frames, smoothness, ends).map_err(|e| Error::value(format!("the path: {e}")))?;
-        Ok(Action { deed: Deed::Move { body, path: Arc::new(path) } })
+        Ok(Action { deed: Deed::MoveAlong { body, path: Arc::new(path) } })
     }
 
     /// Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
@@ -230,13 +230,13 @@ impl Action {
             Deed::Spawn { .. } => "spawn",
             Deed::Push { .. } => "push",
             Deed::Force { .. } => "force",
-            Deed::Velocity { .. } => "set_velocity",
+            Deed::SetVelocity { .. } => "set_velocity",
             Deed::Remove(_) => "remove",
             Deed::Enable(_) => "enable",
             Deed::Disable(_) => "disable",
             Deed::Attach { .. } => "attach",
             Deed::Recolor { .. } => "recolor",
-            Deed::Move { .. } => "move_along",
+            Deed::MoveAlong { .. } => "move_along",
             Deed::Drive { .. } => "drive",
             Deed::Camera(_) => "camera",
             Deed::Light(_) => "light",
