@@ -335,7 +335,7 @@ fn depths_are_least(shapes: &[Shape], cases: usize, sampled: usize, seed: u64) -
         }
         overlapping += 1;
         let depth = -pair.distance;
-        if depth > 1e-9 && least > of_a.radius + of_b.radius {
+        if least.is_finite() && least > of_a.radius + of_b.radius {
             assert!((depth - least).abs() < 1e-12, "case {case}: a depth of {depth} instead of {least}");
         } else {
             // the axes of a capsule or sphere and of the other body do not meet: the distance of the cores decides

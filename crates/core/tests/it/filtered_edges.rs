@@ -124,11 +124,12 @@ fn what_a_ball_passes_through_covers_no_edge() {
                     }
                     let (end, last) = with[with.len() - 1];
                     match name {
-                        // the edge takes the velocity along the line to the center, which is 60° from the motion
+                        // the edge takes the velocity along the line to the center, which is 60° from the motion, or 0.04 rad of the
+                        // way of a step more
                         "against" => {
                             let n = Vec3::new(-0.75f64.sqrt(), 0.0, 0.5);
                             let after = v - n * n.dot(&v);
-                            assert!((last - after).norm() < 2e-2, "{place}: {last:?} instead of {after:?}");
+                            assert!((last - after).norm() < 4e-2, "{place}: {last:?} instead of {after:?}");
                         }
                         "below" => {
                             assert!(last.norm() < 1e-6 && (end.x + 0.1).abs() < 1e-3, "{place}: {end:?} {last:?}")
@@ -241,5 +242,55 @@ fn filtered_shapes_make_no_ghost_collisions_on_flush_tiles() {
                 }
             }
         }
+    }
+}
+
+/// Two compounds that both have filters: a ball with a ghost inside, and a plate of flush tiles of two groups, both of which the
+/// ball meets and one the ghost. Whichever of them moves, it moves as without any filter.
+#[test]
+fn seams_between_filters_of_one_body_are_hidden_from_a_body_with_filters_too() {
+    let tiles = (0..8).map(|k| {
+        let pose = Pose::translation(0.25 * f64::from(k) - 0.4, 0.0, -0.1);
+        CompoundPart::new(Shape::cuboid(Vec3::new(0.25, 1.0, 0.2)).unwrap(), pose)
+    });
+    let plate = Shape::compound(tiles.collect()).unwrap();
+    let inside = CompoundPart::new(sphere(0.03), Pose::identity());
+    let ball = Shape::compound(vec![CompoundPart::new(sphere(0.1), Pose::identity()), inside]).unwrap();
+    for plate_moves in [false, true] {
+        let run = |filtered: bool| {
+            let mut world = no_gravity(world("time_stepping", 1.0 / 240.0));
+            let mut plate = RigidBody::new(plate.clone()).with_name("plate").with_mass(1.0).with_material(smooth());
+            let mut ball = RigidBody::new(ball.clone()).with_name("ball").with_mass(1.0).with_material(smooth());
+            if filtered {
+                for k in 0..8 {
+                    plate = plate.with_shape_filter(k, of_group(1 + (k % 2) as u8));
+                }
+                ball = ball.with_shape_filter(1, ShapeFilter { mask: 1 << 1, ..ShapeFilter::default() });
+            }
+            let (v, press) = (Vec3::new(2.0, 0.3, 0.0), Vec3::new(0.0, 0.0, -9.81));
+            ball = ball.with_pose(Pose::translation(-0.3, 0.01, 0.1));
+            let (moving, push) = if plate_moves {
+                world.add_static(ball).unwrap();
+                let locked = LockedAxes { rotation: [true; 3], ..LockedAxes::default() };
+                (world.add(plate.with_locked(locked).with_velocity(-v)).unwrap(), -press)
+            } else {
+                world.add_static(plate).unwrap();
+                (world.add(ball.with_velocity(v)).unwrap(), press)
+            };
+            let mut path = Vec::new();
+            while world.time() < 0.4 {
+                world.apply_force(moving, 0, push, &position(&world, moving)).unwrap();
+                world.step().unwrap();
+                path.push((position(&world, moving), velocity(&world, moving)));
+            }
+            path
+        };
+        let (with, without) = (run(true), run(false));
+        for (n, ((x, v), (y, w))) in with.iter().zip(&without).enumerate() {
+            let place = format!("the plate moves: {plate_moves}, step {n}");
+            assert!((x - y).norm() < 1e-9 && (v - w).norm() < 1e-9, "{place}: {v:?} instead of {w:?}");
+        }
+        let (_, last) = with[with.len() - 1];
+        assert!((last.x.abs() - 2.0).abs() < 1e-3, "the plate moves: {plate_moves}: {last:?}");
     }
 }

@@ -110,7 +110,9 @@ impl Recorder {
 
     /// Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
     /// each once.
-    fn frame(&self, py: Python<'_>, world: &Bound<'_, World>) -> Result<()> {
+    #[pyo3(signature = (world, **unknown), text_signature = "($self, world)")]
+    fn frame(&self, py: Python<'_>, world: &Bound<'_, World>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "Recorder.frame")?;
         let shared = world.get().shared.clone();
         py.detach(|| self.add(&shared))
     }
