@@ -345,7 +345,8 @@ fn depths_are_least(shapes: &[Shape], cases: usize, sampled: usize, seed: u64) -
             let way = of_a.way_out(&of_b, &rng.direction());
             assert!(way > depth - 1e-12, "case {case}: {way} separates, and {depth} is said to be the least");
         }
-        assert!((of_a.way_out(&of_b, &pair.normal) - depth).abs() < 1e-12, "case {case}: the normal is another one");
+        let way = of_a.way_out(&of_b, &pair.normal);
+        assert!((way - depth).abs() < 1e-12, "case {case}: {way} along the normal, and a depth of {depth}");
         assert!((pair.points[0] - pair.points[1] + pair.normal * depth).norm() < 1e-12, "case {case}");
         for (shape, pose, point) in [(a, &pa, &pair.points[0]), (b, &pb, &pair.points[1])] {
             let off = shape.closest_point(pose, point).distance;

@@ -22,16 +22,16 @@
 //! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
 //! `flush`.
 //!
-//! Shapes of a compound may have filters of their own. `B₁` and `B₂` are then those shapes of theirs that the touching shape of
-//! `A` meets, and the nearest contact is one of a shape of `A` with the same filter: what `A` passes through hides nothing.
+//! Each shape of a compound is a `B` of its own, so the seams inside a compound that does not move are removed likewise. Shapes
+//! may have filters of their own: the nearest contact is one of a shape of `A` with the same filter, so what `A` passes through
+//! hides nothing.
 
 use crate::contact::coplanar::PlaneContacts;
 use crate::contact::detect::{ContactConstraint, Owner};
 use crate::object::part_state::PartState;
 use crate::object::{FilteredPart, ShapeFilter};
 use crate::world::view::Objects;
-use std::borrow::Cow;
-use tumble_collide::{Shape, SurfacePoint, Vec3, closest_point_within};
+use tumble_collide::{Pose, Shape, SurfacePoint, Vec3, closest_point_within};
 
 /// Height above the plane at which `B₂` must be absent, in drift tolerances.
 pub(crate) const LIFT: f64 = 10.0;
@@ -54,27 +54,29 @@ pub(crate) struct InternalEdges {
     /// Start of the entries of each part, and the entries: contacts of a moving part.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    /// The nearest contact with each other part, of the shapes with each filter.
+    /// The nearest contact with each other shape, of the shapes with each filter.
     nearest: Vec<Entry>,
     /// The contacts of a part, nearest first.
     order: Vec<Entry>,
-    /// The row of the part whose surface has removed each contact.
-    removed_by: Vec<Option<u32>>,
+    /// The shape whose surface has removed each contact.
+    removed_by: Vec<Option<Side>>,
     /// Contacts with planes, which replace others.
     of_planes: Vec<ContactConstraint>,
 }
+
+/// The row of a part, and one of its shapes: the index of a part of a compound, 0 of all others.
+pub(crate) type Side = [u32; 2];
 
 /// A contact as one of its parts, `A`, sees it.
 #[derive(Clone, Copy)]
 pub(crate) struct Entry {
     pub contact: u32,
-    /// The row of `A`, and its shape that touches.
-    pub part: u32,
-    pub shape: u32,
-    /// The filter of that shape; `None` for that of the body.
+    /// The filter of the shape of `A`; `None` for that of the body.
     pub filter: Option<ShapeFilter>,
     /// The row of the other part.
     pub other: u32,
+    /// Its shape.
+    pub other_shape: u32,
     pub gap: f64,
     /// Unit normal, towards `A`.
     pub normal: Vec3,
@@ -86,10 +88,15 @@ impl Entry {
     /// Returns a contact as seen by its first or second part.
     fn new(contact: u32, constraint: &ContactConstraint, second: bool) -> Entry {
         let c = &constraint.contact;
-        let (sign, [other, part]) =
-            if second { (-1.0, [constraint.a, constraint.b]) } else { (1.0, [constraint.b, constraint.a]) };
-        let (normal, shape) = (sign * c.normal, c.shapes[usize::from(second)]);
-        Entry { contact, part, shape, filter: None, other, gap: c.gap, normal, point: c.point - normal * (0.5 * c.gap) }
+        let (sign, other) = if second { (-1.0, constraint.a) } else { (1.0, constraint.b) };
+        let (normal, other_shape) = (sign * c.normal, c.shapes[usize::from(!second)]);
+        let point = c.point - normal * (0.5 * c.gap);
+        Entry { contact, filter: None, other, other_shape, gap: c.gap, normal, point }
+    }
+
+    /// Returns the other shape.
+    pub fn side(&self) -> Side {
+        [self.other, self.other_shape]
     }
 }
 
@@ -115,9 +122,13 @@ impl Surroundings<'_> {
         Some(self.part(part)?.shape)
     }
 
-    /// Returns those shapes of the other part of an entry that its own shape meets.
-    fn met(&self, entry: &Entry, other: u32) -> Option<Cow<'_, Shape>> {
-        self.part(other)?.meeting_shape(&self.part(entry.part)?, entry.shape)
+    /// Returns one shape of a part, at its pose.
+    fn single(&self, [part, shape]: Side) -> Option<(&Shape, Pose)> {
+        let pose = self.part_states[part as usize].pose;
+        match self.shape(part)? {
+            Shape::Compound(compound) => compound.placed().nth(shape as usize).map(|(shape, own)| (shape, pose * own)),
+            whole => Some((whole, pose)),
+        }
     }
 
     fn moves(&self, part: u32) -> bool {
@@ -126,16 +137,15 @@ impl Surroundings<'_> {
         entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(owner.part as usize))
     }
 
-    /// Returns the point that is closest to a point, on the surface of those shapes of a part that the own shape of an entry
-    /// meets; `None` if it is more than `limit` away, m.
-    pub fn closest(&self, entry: &Entry, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
-        let shape = &*self.met(entry, part)?;
-        let pose = &self.part_states[part as usize].pose;
+    /// Returns the point of a shape's surface that is closest to a point; `None` if it is more than
+    /// `limit` away, m.
+    pub fn closest(&self, side: Side, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+        let (shape, pose) = self.single(side)?;
         let reach = shape.bounding_radius() + limit;
         if (point - pose.translation.vector).norm_squared() > reach * reach {
             return None;
         }
-        closest_point_within(shape, pose, point, limit)
+        closest_point_within(shape, &pose, point, limit)
     }
 
     /// Returns whether the contact `c` of `A` can only be reached through the part of `first`.
@@ -148,18 +158,18 @@ impl Surroundings<'_> {
             return false;
         }
         // manifolds extend a little beyond a face; a point outside is moved to the surface
-        let overhang = MAX_OVERHANG * self.shape(c.other).map_or(0.0, Shape::bounding_radius);
+        let overhang = MAX_OVERHANG * self.single(c.side()).map_or(0.0, |(shape, _)| shape.bounding_radius());
         let height = |point: &Vec3| first.normal.dot(&(point - first.point));
-        if height(&c.point) > overhang || self.closest(c, first.other, &c.point, tolerance + overhang).is_none() {
+        if height(&c.point) > overhang || self.closest(first.side(), &c.point, tolerance + overhang).is_none() {
             return false;
         }
-        let Some(surface) = self.closest(c, c.other, &c.point, f64::INFINITY) else { return false };
+        let Some(surface) = self.closest(c.side(), &c.point, f64::INFINITY) else { return false };
         let point = if surface.distance > 0.0 { surface.point } else { c.point };
-        if height(&point) > FLUSH * lift || self.closest(c, first.other, &point, tolerance).is_none() {
+        if height(&point) > FLUSH * lift || self.closest(first.side(), &point, tolerance).is_none() {
             return false;
         }
         let above = point + first.normal * (lift - height(&point));
-        self.closest(c, c.other, &above, (1.0 - FLUSH) * lift).is_none()
+        self.closest(c.side(), &above, (1.0 - FLUSH) * lift).is_none()
     }
 }
 
@@ -175,7 +185,7 @@ impl InternalEdges {
         let mut any = false;
         for range in self.starts.windows(2) {
             let entries = &self.entries[range[0] as usize..range[1] as usize];
-            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.other == entries[0].other) {
+            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.side() == entries[0].side()) {
                 continue;
             }
             // contacts are ordered by pair
@@ -183,7 +193,7 @@ impl InternalEdges {
             for same in entries.chunk_by(|x, y| x.other == y.other) {
                 let start = self.nearest.len();
                 for entry in same {
-                    let alike = |known: &&mut Entry| known.filter == entry.filter;
+                    let alike = |known: &&mut Entry| known.filter == entry.filter && known.side() == entry.side();
                     match self.nearest[start..].iter_mut().find(alike) {
                         Some(known) if known.gap.total_cmp(&entry.gap).is_gt() => *known = *entry,
                         Some(_) => {}
@@ -194,7 +204,7 @@ impl InternalEdges {
             self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
             if let Some(plane) = PlaneContacts::find(around, (entries, &self.nearest), contacts) {
                 let replaced = entries.iter().filter(|e| plane.tiles.contains(&e.other));
-                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.other));
+                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.side()));
                 self.of_planes.extend(plane.contacts);
                 any = true;
             }
@@ -208,11 +218,11 @@ impl InternalEdges {
                 }
                 let internal = |first: &&Entry| {
                     let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
-                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.other);
-                    first.other != c.other && first.filter == c.filter && !mutual && around.is_internal(c, first)
+                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.side());
+                    first.side() != c.side() && first.filter == c.filter && !mutual && around.is_internal(c, first)
                 };
                 if let Some(first) = self.nearest.iter().find(internal) {
-                    self.removed_by[c.contact as usize] = Some(first.other);
+                    self.removed_by[c.contact as usize] = Some(first.side());
                     any = true;
                 }
             }
@@ -255,10 +265,9 @@ impl InternalEdges {
         self.starts[around.owners.len()] = end;
         let empty = Entry {
             contact: 0,
-            part: 0,
-            shape: 0,
             filter: None,
             other: 0,
+            other_shape: 0,
             gap: 0.0,
             normal: Vec3::zeros(),
             point: Vec3::zeros(),
@@ -270,7 +279,8 @@ impl InternalEdges {
             if let Some((part, second)) = seen(index) {
                 self.starts[part as usize] -= 1;
                 let mut entry = Entry::new(index as u32, &contacts[index], second);
-                entry.filter = around.part(part).and_then(|part| part.filter_of(entry.shape));
+                let shape = contacts[index].contact.shapes[usize::from(second)];
+                entry.filter = around.part(part).and_then(|part| part.filter_of(shape));
                 self.entries[self.starts[part as usize] as usize] = entry;
             }
         }

@@ -233,8 +233,9 @@ fn filtered_shapes_make_no_ghost_collisions_on_flush_tiles() {
                 };
                 let (on_tiles, on_plane) = (run(true), run(false));
                 for (n, ((x, v), (y, w))) in on_tiles.iter().zip(&on_plane).enumerate() {
-                    let place =
-                        format!("{make:?} {name}, filters of tiles {tiles_filtered}, of the mover {mover_filtered}");
+                    let place = format!(
+                        "{make:?} {name}, filters of tiles {tiles_filtered}, of the mover {mover_filtered}, {x:?} {y:?}"
+                    );
                     assert!(
                         (v - w).norm() < 1e-6 && (x - y).norm() < 1e-6,
                         "{place}, step {n}: {v:?} instead of {w:?}"
@@ -291,6 +292,7 @@ fn seams_between_filters_of_one_body_are_hidden_from_a_body_with_filters_too() {
             assert!((x - y).norm() < 1e-9 && (v - w).norm() < 1e-9, "{place}: {v:?} instead of {w:?}");
         }
         let (_, last) = with[with.len() - 1];
-        assert!((last.x.abs() - 2.0).abs() < 1e-3, "the plate moves: {plate_moves}: {last:?}");
+        // seams of a compound that moves are removed where they are buried alone
+        assert!(plate_moves || (last.x - 2.0).abs() < 1e-6 && last.z.abs() < 1e-6, "{last:?}");
     }
 }
