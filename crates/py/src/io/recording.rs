@@ -133,12 +133,12 @@ impl Recorder {
             return Err(Error::value("every is 0; it must be at least 1"));
         }
         if self.frames() == 0 {
-            self.frame(py, world)?;
+            self.frame(py, world, None)?;
         }
         for k in 1..=n {
             world.get().shared.work(py, |inner| inner.step())?;
             if k % every == 0 {
-                self.frame(py, world)?;
+                self.frame(py, world, None)?;
             }
             py.check_signals()?;
         }

@@ -109,7 +109,6 @@ impl ArticulationBuilder {
         friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    #[pyo3(signature = (name, parent, joint, axis, position, orientation, shape, shape_position, shape_orientation, mass, density, center_of_mass, inertia, limits, joint_damping, joint_friction, armature, stiffness, rest, drive, max_velocity, effort, q, qd, collidable, color, cone, contacts, group, mask, twist_limits, appearance, surface, **unknown), text_signature = "($self, name, parent, joint, axis, position, orientation, shape, shape_position, shape_orientation, mass, density, center_of_mass, inertia, limits, joint_damping, joint_friction, armature, stiffness, rest, drive, max_velocity, effort, q, qd, collidable, color, cone, contacts, group, mask, twist_limits, appearance, surface)")]
     fn add_link(
         &self,
         name: &str,
@@ -145,9 +144,7 @@ impl ArticulationBuilder {
         twist_limits: Option<&Bound<'_, PyAny>>,
         appearance: Option<&Bound<'_, PyAny>>,
         surface: Option<&Bound<'_, PyDict>>,
-        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
-        keywords::check(unknown, "ArticulationBuilder.add_link")?;
         if self.builder().links().iter().any(|known| known.name() == name) {
             return Err(Error::value(format!("there is a link named '{name}' already")));
         }
@@ -227,7 +224,6 @@ impl ArticulationBuilder {
         friction_scale=None, rolling_friction=None, torsional_friction=None, tangential_restitution=None, adhesion=None, surface_velocity=None, appearance=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-    #[pyo3(signature = (link, shape, position, orientation, collidable, one_way, sensor, mass, density, contacts, group, mask, color, visible, appearance, surface, **unknown), text_signature = "($self, link, shape, position, orientation, collidable, one_way, sensor, mass, density, contacts, group, mask, color, visible, appearance, surface)")]
     fn add_shape(
         &self,
         link: &str,
@@ -246,9 +242,7 @@ impl ArticulationBuilder {
         visible: bool,
         appearance: Option<&Bound<'_, PyAny>>,
         surface: Option<&Bound<'_, PyDict>>,
-        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
-        keywords::check(unknown, "ArticulationBuilder.add_shape")?;
         self.has(link)?;
         if mass.is_some() && density.is_some() {
             return Err(Error::value(format!("shape of link '{link}': expected a mass or a density, not both")));
