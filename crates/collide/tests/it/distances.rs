@@ -335,7 +335,9 @@ fn depths_are_least(shapes: &[Shape], cases: usize, sampled: usize, seed: u64) -
         }
         overlapping += 1;
         let depth = -pair.distance;
-        if least.is_finite() && least > of_a.radius + of_b.radius {
+        // of cores that all but touch the distance is known to rounding, and its direction less well
+        let cores_overlap = least.is_finite() && least > of_a.radius + of_b.radius;
+        if cores_overlap {
             assert!((depth - least).abs() < 1e-12, "case {case}: a depth of {depth} instead of {least}");
         } else {
             // the axes of a capsule or sphere and of the other body do not meet: the distance of the cores decides
@@ -346,7 +348,8 @@ fn depths_are_least(shapes: &[Shape], cases: usize, sampled: usize, seed: u64) -
             assert!(way > depth - 1e-12, "case {case}: {way} separates, and {depth} is said to be the least");
         }
         let way = of_a.way_out(&of_b, &pair.normal);
-        assert!((way - depth).abs() < 1e-12, "case {case}: {way} along the normal, and a depth of {depth}");
+        let error = if cores_overlap { 1e-12 } else { 1e-9 };
+        assert!((way - depth).abs() < error, "case {case}: {way} along the normal, and a depth of {depth}");
         assert!((pair.points[0] - pair.points[1] + pair.normal * depth).norm() < 1e-12, "case {case}");
         for (shape, pose, point) in [(a, &pa, &pair.points[0]), (b, &pb, &pair.points[1])] {
             let off = shape.closest_point(pose, point).distance;
