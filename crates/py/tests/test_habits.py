@@ -227,6 +227,29 @@ def hinged():
     return world.add_joint("revolute", world.add_rigid("door", tumble.Sphere(0.1), mass=1))
 
 
+def short_calls():
+    world = tumble.World()
+    body = world.add_rigid("a", tumble.Sphere(1), mass=1)
+    return [
+        (lambda: body.apply_force((1, 0, 0), pont=(0, 0, 0)), "did you mean 'point'"),
+        (lambda: body.move_to(posision=(0, 0, 0)), "did you mean 'position'"),
+        (lambda: world.step(number=3), "there are n$"),
+        (lambda: arm()[1].mass_matrix(qq=[0, 0, 0]), "did you mean 'q'|there are q"),
+        (lambda: tumble.Trigger.asleep(body="a"), "did you mean 'bodies'"),
+        (lambda: tumble.Trigger.time(when=1.0), "missing 1 required positional argument: 'at'"),
+        (lambda: tumble.Action.remove(bdy="a"), "missing 1 required positional argument: 'body'"),
+        (lambda: tumble.Sphere(raduis=1.0), "missing 1 required positional argument: 'radius'"),
+        (lambda: world.body(nme="a"), "missing 1 required positional argument: 'name'"),
+        (lambda: tumble.Ellipsoid((1, 1, 1), w=2), "there are size, y, z"),
+    ]
+
+
+@pytest.mark.parametrize(("call", "meant"), short_calls())
+def test_methods_of_few_arguments_name_the_right_one(call, meant):
+    with pytest.raises(TypeError, match=meant):
+        call()
+
+
 def test_a_keyword_that_is_like_no_other_lists_all():
     with pytest.raises(TypeError, match=r"Box\(\) got an unexpected keyword argument 'half_extents'; there are size, y, z, rounding$"):
         tumble.Box(1, half_extents=2)
