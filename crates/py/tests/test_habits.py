@@ -1,6 +1,8 @@
 """What people write by habit: all drives at once, letters of axes, three sizes, forces between two bodies, and messages for typing errors."""
 
+import copy
 import inspect
+import pickle
 import subprocess
 import sys
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 import tumble
+import tumble.distributed
 
 G = 9.81
 
@@ -224,11 +227,66 @@ def hinged():
     return world.add_joint("revolute", world.add_rigid("door", tumble.Sphere(0.1), mass=1))
 
 
+def short_calls():
+    world = tumble.World()
+    body = world.add_rigid("a", tumble.Sphere(1), mass=1)
+    return [
+        (lambda: body.apply_force((1, 0, 0), pont=(0, 0, 0)), "did you mean 'point'"),
+        (lambda: body.move_to(posision=(0, 0, 0)), "did you mean 'position'"),
+        (lambda: world.step(number=3), "there are n$"),
+        (lambda: arm()[1].mass_matrix(qq=[0, 0, 0]), "did you mean 'q'|there are q"),
+        (lambda: tumble.Trigger.asleep(body="a"), "did you mean 'bodies'"),
+        (lambda: tumble.Trigger.time(when=1.0), "missing 1 required positional argument: 'at'"),
+        (lambda: tumble.Action.remove(bdy="a"), "missing 1 required positional argument: 'body'"),
+        (lambda: tumble.Sphere(raduis=1.0), "missing 1 required positional argument: 'radius'"),
+        (lambda: world.body(nme="a"), "missing 1 required positional argument: 'name'"),
+        (lambda: tumble.Ellipsoid((1, 1, 1), w=2), "there are size, y, z"),
+    ]
+
+
+@pytest.mark.parametrize(("call", "meant"), short_calls())
+def test_methods_of_few_arguments_name_the_right_one(call, meant):
+    with pytest.raises(TypeError, match=meant):
+        call()
+
+
 def test_a_keyword_that_is_like_no_other_lists_all():
     with pytest.raises(TypeError, match=r"Box\(\) got an unexpected keyword argument 'half_extents'; there are size, y, z, rounding$"):
         tumble.Box(1, half_extents=2)
     with pytest.raises(TypeError, match=r"add_link\(\) got an unexpected keyword argument 'fricton'; did you mean 'friction'\?"):
         tumble.ArticulationBuilder("a").add_link("l", fricton=1)
+
+
+def written_in_python():
+    return [
+        (tumble.Camera, ((0, 0, 1), (0, 0, 0)), "fov_dg", "fov_deg", "Camera"),
+        (tumble.Camera, (), "targt", "target", "Camera"),
+        (tumble.Appearance, (), "roughnes", "roughness", "Appearance"),
+        (tumble.save_png, (), "pictur", "picture", "save_png"),
+        (tumble.read, (), "pathh", "path", "read"),
+        (tumble.replay, ("none.mcap",), "wrld", "world", "replay"),
+        (tumble.Recording.video, (None, "a.mp4"), "widht", "width", "Recording.video"),
+        (tumble.Recording.animation, (None,), "sped", "speed", "Recording.animation"),
+        (tumble.Animation.save, (None,), "pth", "path", "Animation.save"),
+        (tumble.Window.wait, (None,), "timeot", "timeout", "Window.wait"),
+        (tumble.distributed.map, (abs, [1]), "worker", "workers", "map"),
+        (tumble.distributed.as_completed, (abs, [1]), "retry", "retries", "as_completed"),
+        (tumble.distributed.connect, (), "worker", "workers", "connect"),
+    ]
+
+
+@pytest.mark.parametrize(("call", "given", "wrong", "word", "place"), written_in_python())
+def test_functions_written_in_python_name_the_right_keyword(call, given, wrong, word, place):
+    with pytest.raises(TypeError, match=rf"^{place}\(\) got an unexpected keyword argument '{wrong}'; did you mean '{word}'\?$"):
+        call(*given, **{wrong: 1})
+
+
+def test_named_fields_are_pickled_copied_and_replaced_as_before():
+    camera = tumble.Camera((0, 0, 1), target=(0, 0, 0))
+    assert pickle.loads(pickle.dumps(camera)) == camera == copy.deepcopy(camera)
+    assert camera._replace(fov_deg=20).fov_deg == 20 and camera.up == (0.0, 0.0, 1.0)
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'target'"):
+        tumble.Camera((0, 0, 1))
 
 
 @pytest.mark.parametrize(("program", "meant"), [("tumble.World().gravty", "gravity"), ("tumble.Spere", "Sphere"), ("tumble.World().add_rigd", "add_rigid")])

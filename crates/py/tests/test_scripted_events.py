@@ -44,7 +44,7 @@ do = [{ push = "other", impulse_n_s = [0, 1, 2] }, { set_velocity = "ball 3", ve
 name = "later"
 when = { after = "bounce" }
 delay_s = 0.1
-do = [{ remove = "other" }, { push = "ball 1", force_n = [1, 0, 0], torque_n_m = [0, 0, 0.1], duration_s = 0.2 }]
+do = [{ remove = "other" }, { force = "ball 1", force_n = [1, 0, 0], torque_n_m = [0, 0, 0.1], duration_s = 0.2 }]
 """
     scene = tumble.World.parse(text)
     world = tumble.World(dt=0.004)

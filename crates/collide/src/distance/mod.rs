@@ -1,6 +1,7 @@
 //! Distances: from a point to a shape, and between two shapes.
 
 mod apart;
+mod depth;
 mod gjk;
 mod point;
 mod solid;
@@ -44,8 +45,9 @@ pub struct ClosestPair {
 /// finite.
 ///
 /// The distance of shapes that are apart is exact: that of their surfaces, or of the closest parts of
-/// compounds. Convex shapes that overlap are as deep as the least translation that separates them
-/// near the normal of one of their contacts ([`contacts`]), others as the deepest contact.
+/// compounds. Shapes that overlap are as deep as the least translation that separates them if they are spheres, capsules, boxes,
+/// rounded boxes or convex hulls (whose numbers of edges have a product of at most 65,536); other convex ones as the least near the
+/// normal of one of their contacts ([`contacts`]), all others as the deepest contact.
 pub fn closest_points(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Option<ClosestPair> {
     let finite = |pose: &Pose| (pose.translation.vector.sum() + pose.rotation.coords.sum()).is_finite();
     if !finite(pose_a) || !finite(pose_b) || matches!((a, b), (Shape::HalfSpace, Shape::HalfSpace)) {
@@ -105,23 +107,29 @@ fn closest_of_single(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Clos
 
 /// Returns the pair of two shapes that overlap; `touch` if it has a depth, or they have no contact.
 ///
-/// Convex shapes are as deep as the least translation near the normal of a contact that separates
-/// them, others as their deepest contact. A corner that is slightly beside a face has a contact with
+/// Polytopes are as deep as the least translation that separates them, other convex shapes as the least near the normal
+/// of a contact, all others as their deepest contact. A corner that is slightly beside a face has a contact with
 /// that face, but is not below it: such contacts count only if there is no other.
 fn overlapping(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, touch: ClosestPair) -> ClosestPair {
     if touch.distance < 0.0 {
         return touch;
     }
     let size = a.bounding_radius().min(b.bounding_radius());
+    let cores = [Core::of(a, pose_a), Core::of(b, pose_b)];
+    if let [Some(core_a), Some(core_b)] = &cores
+        && let Some(pair) = depth::polytopes(core_a, core_b, &touch, size)
+    {
+        return pair;
+    }
     let mut found = Vec::new();
     contacts(a, pose_a, b, pose_b, ROUNDING * size, &mut found);
     let least = |x: &&Contact, y: &&Contact| x.gap.total_cmp(&y.gap);
-    if let (Some(core_a), Some(core_b)) = (Core::of(a, pose_a), Core::of(b, pose_b)) {
+    if let [Some(core_a), Some(core_b)] = &cores {
         for contact in &mut found {
-            contact.gap = -core_a.overlap(&core_b, &contact.normal).max(0.0);
+            contact.gap = -core_a.overlap(core_b, &contact.normal).max(0.0);
         }
         let least = found.iter().max_by(least);
-        return least.map_or(touch, |contact| least_translation(&core_a, &core_b, &ClosestPair::of(contact), size));
+        return least.map_or(touch, |contact| least_translation(core_a, core_b, &ClosestPair::of(contact), size));
     }
     let inside = |p: &Vec3| {
         let within = |(shape, pose): (&Shape, &Pose)| shape.closest_point(pose, p).distance <= ROUNDING * size;

@@ -1,10 +1,12 @@
 //! Shapes as the distance sees them: a convex core with a radius, or the triangles of a mesh.
 
+use super::depth::{EdgeArc, Faces};
 use super::gjk::Convex;
 use crate::sdf::DistanceField;
-use crate::sdf::elements::Elements;
+use crate::sdf::elements::{Edge, Elements};
 use crate::shape::{Cone, ellipsoid};
 use crate::{Aabb, MeshShape, Pose, Shape, Vec3};
+use std::cmp::Ordering;
 
 /// A convex body at a pose: all points within a radius of a core.
 pub(super) struct Core<'a> {
@@ -62,6 +64,33 @@ impl<'a> Core<'a> {
     /// a translation by as much separates them.
     pub fn overlap(&self, b: &Core<'_>, normal: &Vec3) -> f64 {
         normal.dot(&(b.support(normal) - self.support(&-normal))) + self.radius + b.radius
+    }
+
+    /// Returns the faces and edges of the core; `None` if it is curved.
+    pub fn faces(&self) -> Option<Faces> {
+        let axes = [0, 1, 2].map(|k| self.pose.rotation * Vec3::ith(k, 1.0));
+        let edge = |direction: Vec3| EdgeArc { direction, normals: None };
+        Some(match &self.kind {
+            Kind::Point => Faces::default(),
+            Kind::Segment(_) => Faces { normals: Vec::new(), edges: vec![edge(axes[2])] },
+            Kind::Box(_) => Faces { normals: axes.to_vec(), edges: axes.map(edge).into() },
+            Kind::Hull(elements) => {
+                let turned = |ends: [Vec3; 2]| ends.map(|n| self.pose.rotation * n);
+                let edge = |edge: &Edge| EdgeArc {
+                    direction: self.pose.rotation * (edge.ends[1] - edge.ends[0]),
+                    normals: Some(turned(edge.normals)),
+                };
+                let edges: Vec<EdgeArc> = elements.edges.iter().map(edge).collect();
+                // each face has edges, so their normals are those of all faces
+                let mut normals: Vec<Vec3> = elements.edges.iter().flat_map(|edge| edge.normals).collect();
+                normals
+                    .sort_by(|x, y| x.iter().zip(y.iter()).fold(Ordering::Equal, |o, (x, y)| o.then(x.total_cmp(y))));
+                normals.dedup();
+                normals.iter_mut().for_each(|n| *n = self.pose.rotation * *n);
+                Faces { normals, edges }
+            }
+            Kind::Cylinder { .. } | Kind::Cone(_) | Kind::Ellipsoid(_) => return None,
+        })
     }
 
     /// Returns the position of the frame, inside or near the body.

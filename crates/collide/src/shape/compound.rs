@@ -251,10 +251,10 @@ impl CompoundShape {
         self.neighbors()[part].iter().any(|other| inside(*other))
     }
 
-    /// Returns whether a contact of part `part`, at a point of its surface with this outward normal, is
+    /// Returns whether a contact of part `part`, at a point of its surface with this outward normal, both in the compound's frame, is
     /// inside another part: the point, or the surface beside it towards the middle of the part. The
     /// latter is true at the end of a face that another part covers.
-    pub(crate) fn has_no_contact(&self, part: usize, point: &Vec3, outward: &Vec3) -> bool {
+    pub fn has_no_contact(&self, part: usize, point: &Vec3, outward: &Vec3) -> bool {
         let arm = point - self.poses[part].translation.vector;
         let across = arm - outward * outward.dot(&arm);
         let inward = across.try_normalize(BESIDE * self.bounding_radius).map_or(Vec3::zeros(), |across| -across);

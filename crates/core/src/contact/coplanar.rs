@@ -138,7 +138,7 @@ fn contacts(
     let on_tile = |contact: &tumble_collide::Contact| {
         let away = if is_a { 0.5 } else { -0.5 } * contact.gap;
         let point = contact.point + away * contact.normal;
-        let tile = tiles.iter().find(|tile| around.closest(tile.other, &point, tolerance).is_some())?;
+        let tile = tiles.iter().find(|tile| around.closest(tile.side(), &point, tolerance).is_some())?;
         let mut constraint = constraints[tile.contact as usize].clone();
         constraint.contact = *contact;
         constraint.key.feature = contact.feature;

@@ -21,12 +21,17 @@
 //! stays. The plane of `B₁` carries `A` across the seam. A wall that stands on `B₁` protrudes and
 //! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
 //! `flush`.
+//!
+//! Each shape of a compound is a `B` of its own, so the seams inside a compound that does not move are removed likewise. Shapes
+//! may have filters of their own: the nearest contact is one of a shape of `A` with the same filter, so what `A` passes through
+//! hides nothing.
 
 use crate::contact::coplanar::PlaneContacts;
 use crate::contact::detect::{ContactConstraint, Owner};
 use crate::object::part_state::PartState;
+use crate::object::{FilteredPart, ShapeFilter};
 use crate::world::view::Objects;
-use tumble_collide::{Shape, SurfacePoint, Vec3, closest_point_within};
+use tumble_collide::{Pose, Shape, SurfacePoint, Vec3, closest_point_within};
 
 /// Height above the plane at which `B₂` must be absent, in drift tolerances.
 pub(crate) const LIFT: f64 = 10.0;
@@ -49,22 +54,29 @@ pub(crate) struct InternalEdges {
     /// Start of the entries of each part, and the entries: contacts of a moving part.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    /// The nearest contact with each other part.
+    /// The nearest contact with each other shape, of the shapes with each filter.
     nearest: Vec<Entry>,
     /// The contacts of a part, nearest first.
     order: Vec<Entry>,
-    /// The row of the part whose surface has removed each contact.
-    removed_by: Vec<Option<u32>>,
+    /// The shape whose surface has removed each contact.
+    removed_by: Vec<Option<Side>>,
     /// Contacts with planes, which replace others.
     of_planes: Vec<ContactConstraint>,
 }
+
+/// The row of a part, and one of its shapes: the index of a part of a compound, 0 of all others.
+pub(crate) type Side = [u32; 2];
 
 /// A contact as one of its parts, `A`, sees it.
 #[derive(Clone, Copy)]
 pub(crate) struct Entry {
     pub contact: u32,
+    /// The filter of the shape of `A`; `None` for that of the body.
+    pub filter: Option<ShapeFilter>,
     /// The row of the other part.
     pub other: u32,
+    /// Its shape.
+    pub other_shape: u32,
     pub gap: f64,
     /// Unit normal, towards `A`.
     pub normal: Vec3,
@@ -77,8 +89,14 @@ impl Entry {
     fn new(contact: u32, constraint: &ContactConstraint, second: bool) -> Entry {
         let c = &constraint.contact;
         let (sign, other) = if second { (-1.0, constraint.a) } else { (1.0, constraint.b) };
-        let normal = sign * c.normal;
-        Entry { contact, other, gap: c.gap, normal, point: c.point - normal * (0.5 * c.gap) }
+        let (normal, other_shape) = (sign * c.normal, c.shapes[usize::from(!second)]);
+        let point = c.point - normal * (0.5 * c.gap);
+        Entry { contact, filter: None, other, other_shape, gap: c.gap, normal, point }
+    }
+
+    /// Returns the other shape.
+    pub fn side(&self) -> Side {
+        [self.other, self.other_shape]
     }
 }
 
@@ -94,12 +112,23 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Returns the shape of a part; `None` also for one whose shapes have filters of their own, since another part may meet only
-    /// some of them.
-    pub fn shape(&self, part: u32) -> Option<&Shape> {
+    fn part(&self, part: u32) -> Option<FilteredPart<'_>> {
         let owner = &self.owners[part as usize];
-        let (body, part) = (self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize);
-        body.shape(part).filter(|_| body.shape_filters(part).is_empty())
+        FilteredPart::of(self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize)
+    }
+
+    /// Returns the shape of a part.
+    pub fn shape(&self, part: u32) -> Option<&Shape> {
+        Some(self.part(part)?.shape)
+    }
+
+    /// Returns one shape of a part, at its pose.
+    fn single(&self, [part, shape]: Side) -> Option<(&Shape, Pose)> {
+        let pose = self.part_states[part as usize].pose;
+        match self.shape(part)? {
+            Shape::Compound(compound) => compound.placed().nth(shape as usize).map(|(shape, own)| (shape, pose * own)),
+            whole => Some((whole, pose)),
+        }
     }
 
     fn moves(&self, part: u32) -> bool {
@@ -108,16 +137,15 @@ impl Surroundings<'_> {
         entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(owner.part as usize))
     }
 
-    /// Returns the point of a part's surface that is closest to a point; `None` if it is more than
+    /// Returns the point of a shape's surface that is closest to a point; `None` if it is more than
     /// `limit` away, m.
-    pub fn closest(&self, part: u32, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
-        let shape = self.shape(part)?;
-        let pose = &self.part_states[part as usize].pose;
+    pub fn closest(&self, side: Side, point: &Vec3, limit: f64) -> Option<SurfacePoint> {
+        let (shape, pose) = self.single(side)?;
         let reach = shape.bounding_radius() + limit;
         if (point - pose.translation.vector).norm_squared() > reach * reach {
             return None;
         }
-        closest_point_within(shape, pose, point, limit)
+        closest_point_within(shape, &pose, point, limit)
     }
 
     /// Returns whether the contact `c` of `A` can only be reached through the part of `first`.
@@ -130,18 +158,18 @@ impl Surroundings<'_> {
             return false;
         }
         // manifolds extend a little beyond a face; a point outside is moved to the surface
-        let overhang = MAX_OVERHANG * self.shape(c.other).map_or(0.0, Shape::bounding_radius);
+        let overhang = MAX_OVERHANG * self.single(c.side()).map_or(0.0, |(shape, _)| shape.bounding_radius());
         let height = |point: &Vec3| first.normal.dot(&(point - first.point));
-        if height(&c.point) > overhang || self.closest(first.other, &c.point, tolerance + overhang).is_none() {
+        if height(&c.point) > overhang || self.closest(first.side(), &c.point, tolerance + overhang).is_none() {
             return false;
         }
-        let Some(surface) = self.closest(c.other, &c.point, f64::INFINITY) else { return false };
+        let Some(surface) = self.closest(c.side(), &c.point, f64::INFINITY) else { return false };
         let point = if surface.distance > 0.0 { surface.point } else { c.point };
-        if height(&point) > FLUSH * lift || self.closest(first.other, &point, tolerance).is_none() {
+        if height(&point) > FLUSH * lift || self.closest(first.side(), &point, tolerance).is_none() {
             return false;
         }
         let above = point + first.normal * (lift - height(&point));
-        self.closest(c.other, &above, (1.0 - FLUSH) * lift).is_none()
+        self.closest(c.side(), &above, (1.0 - FLUSH) * lift).is_none()
     }
 }
 
@@ -157,20 +185,26 @@ impl InternalEdges {
         let mut any = false;
         for range in self.starts.windows(2) {
             let entries = &self.entries[range[0] as usize..range[1] as usize];
-            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.other == entries[0].other) {
+            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.side() == entries[0].side()) {
                 continue;
             }
             // contacts are ordered by pair
             self.nearest.clear();
-            self.nearest.extend(
-                entries
-                    .chunk_by(|x, y| x.other == y.other)
-                    .filter_map(|same| same.iter().min_by(|x, y| x.gap.total_cmp(&y.gap)).copied()),
-            );
+            for same in entries.chunk_by(|x, y| x.other == y.other) {
+                let start = self.nearest.len();
+                for entry in same {
+                    let alike = |known: &&mut Entry| known.filter == entry.filter && known.side() == entry.side();
+                    match self.nearest[start..].iter_mut().find(alike) {
+                        Some(known) if known.gap.total_cmp(&entry.gap).is_gt() => *known = *entry,
+                        Some(_) => {}
+                        None => self.nearest.push(*entry),
+                    }
+                }
+            }
             self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
             if let Some(plane) = PlaneContacts::find(around, (entries, &self.nearest), contacts) {
                 let replaced = entries.iter().filter(|e| plane.tiles.contains(&e.other));
-                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.other));
+                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.side()));
                 self.of_planes.extend(plane.contacts);
                 any = true;
             }
@@ -184,11 +218,11 @@ impl InternalEdges {
                 }
                 let internal = |first: &&Entry| {
                     let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
-                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.other);
-                    first.other != c.other && !mutual && around.is_internal(c, first)
+                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.side());
+                    first.side() != c.side() && first.filter == c.filter && !mutual && around.is_internal(c, first)
                 };
                 if let Some(first) = self.nearest.iter().find(internal) {
-                    self.removed_by[c.contact as usize] = Some(first.other);
+                    self.removed_by[c.contact as usize] = Some(first.side());
                     any = true;
                 }
             }
@@ -229,14 +263,25 @@ impl InternalEdges {
             *start = end;
         }
         self.starts[around.owners.len()] = end;
-        let empty = Entry { contact: 0, other: 0, gap: 0.0, normal: Vec3::zeros(), point: Vec3::zeros() };
+        let empty = Entry {
+            contact: 0,
+            filter: None,
+            other: 0,
+            other_shape: 0,
+            gap: 0.0,
+            normal: Vec3::zeros(),
+            point: Vec3::zeros(),
+        };
         self.entries.clear();
         self.entries.resize(end as usize, empty);
         // and from the last contact back to their starts
         for index in (0..contacts.len()).rev() {
             if let Some((part, second)) = seen(index) {
                 self.starts[part as usize] -= 1;
-                self.entries[self.starts[part as usize] as usize] = Entry::new(index as u32, &contacts[index], second);
+                let mut entry = Entry::new(index as u32, &contacts[index], second);
+                let shape = contacts[index].contact.shapes[usize::from(second)];
+                entry.filter = around.part(part).and_then(|part| part.filter_of(shape));
+                self.entries[self.starts[part as usize] as usize] = entry;
             }
         }
     }

@@ -114,8 +114,12 @@ impl MovingPair<'_> {
         match self.filtered {
             None => self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found),
             Some([a, b]) => {
-                for [a, b] in a.contact_pairs(&b) {
-                    self.tests.contacts(self.mode, [&a, &b], poses.each_ref(), margin, found);
+                let pairs = a.contact_pairs(&b);
+                for [a, b] in &pairs {
+                    self.tests.contacts(self.mode, [a, b], poses.each_ref(), margin, found);
+                }
+                if pairs.len() > 1 {
+                    a.drop_buried(&b, &poses[0], found);
                 }
             }
         }

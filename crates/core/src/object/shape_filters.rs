@@ -3,7 +3,7 @@
 use super::collidable::{Collidable, CollisionGroup};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use tumble_collide::{CompoundShape, Shape};
+use tumble_collide::{CompoundShape, Contact, Pose, Shape};
 
 /// Group, mask and sensor of one shape of a compound, instead of those of its body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -110,6 +110,12 @@ impl<'a> FilteredPart<'a> {
         Some([a?, b?])
     }
 
+    /// Returns the filter of one shape; `None` for that of the body.
+    pub fn filter_of(&self, shape: u32) -> Option<ShapeFilter> {
+        let own = self.body.shape_filters(self.part);
+        own.iter().find(|(n, _)| *n == shape as usize).map(|(_, filter)| *filter)
+    }
+
     fn whole(&self) -> FilterClass {
         FilterClass { filter: None, parts: Vec::new() }
     }
@@ -182,7 +188,7 @@ impl<'a> FilteredPart<'a> {
             .collect()
     }
 
-    /// Returns its shapes that a sensor, one of another part, reports.
+    /// Returns its solid shapes that collide with those of a class of another part: what a sensor of it reports.
     pub fn sensed_by(&self, sensor: &FilteredPart<'_>, class: &FilterClass) -> Option<Cow<'a, Shape>> {
         let group = class.group(sensor.body, sensor.part);
         self.shape_if(|own| {
@@ -192,33 +198,66 @@ impl<'a> FilteredPart<'a> {
         })
     }
 
+    /// Returns its shapes that have contacts with one shape of another part.
+    pub fn meeting_shape(&self, other: &FilteredPart<'_>, shape: u32) -> Option<Cow<'a, Shape>> {
+        if self.body.shape_filters(self.part).is_empty() && other.body.shape_filters(other.part).is_empty() {
+            return Some(Cow::Borrowed(self.shape));
+        }
+        self.sensed_by(other, &FilterClass { filter: other.filter_of(shape), parts: Vec::new() })
+    }
+
     /// Returns the shapes of this part and another that have contacts with each other: one pair for nearly all parts, several if both
-    /// have shapes with filters of their own.
+    /// have shapes with filters of their own. In each pair all shapes of this part meet all of the other one.
     pub fn contact_pairs(&self, other: &FilteredPart<'a>) -> Vec<[Cow<'a, Shape>; 2]> {
-        let meets = |own: &FilterClass, of: &FilterClass| {
-            let (group, of_other) = (own.group(self.body, self.part), of.group(other.body, other.part));
-            !own.is_sensor(self.body, self.part)
-                && own.collides_with(self.body, self.part, of_other)
-                && of.collides_with(other.body, other.part, group)
-        };
-        let theirs = other.classes().map_or_else(|| vec![other.whole()], |(_, classes)| classes);
-        // shapes of the other part that meet the same shapes of this one are one pair
+        let classes =
+            |side: &FilteredPart<'a>| side.classes().map_or_else(|| vec![side.whole()], |(_, classes)| classes);
+        let (own, theirs) = (classes(self), classes(other));
+        // shapes of this part that meet the same shapes of the other one are one pair
         type Filters = Vec<Option<ShapeFilter>>;
-        let mut found: Vec<(Filters, Cow<'a, Shape>, Filters)> = Vec::new();
-        for class in theirs.iter().filter(|class| !class.is_sensor(other.body, other.part)) {
-            let own = self.classes().map_or_else(|| vec![self.whole()], |(_, classes)| classes);
-            let met: Vec<_> = own.iter().filter(|own| meets(own, class)).map(|own| own.filter).collect();
-            match found.iter_mut().find(|(known, ..)| *known == met) {
-                Some((.., of)) => of.push(class.filter),
-                None => {
-                    found.extend(self.shape_if(|own| meets(own, class)).map(|shape| (met, shape, vec![class.filter])))
-                }
+        let mut found: Vec<[Filters; 2]> = Vec::new();
+        for class in own.iter().filter(|class| !class.is_sensor(self.body, self.part)) {
+            let group = class.group(self.body, self.part);
+            let meets = |of: &&FilterClass| {
+                !of.is_sensor(other.body, other.part)
+                    && of.collides_with(other.body, other.part, group)
+                    && class.collides_with(self.body, self.part, of.group(other.body, other.part))
+            };
+            let met: Filters = theirs.iter().filter(meets).map(|of| of.filter).collect();
+            match found.iter_mut().find(|[_, known]| *known == met) {
+                Some([own, _]) => own.push(class.filter),
+                None if met.is_empty() => {}
+                None => found.push([vec![class.filter], met]),
             }
         }
-        let pair = |(_, shape, filters): (_, Cow<'a, Shape>, Filters)| {
-            Some([shape, other.shape_if(|class| filters.contains(&class.filter))?])
+        let pair = |[own, met]: [Filters; 2]| {
+            let own = self.shape_if(|class| own.contains(&class.filter))?;
+            Some([own, other.shape_if(|class| met.contains(&class.filter))?])
         };
         found.into_iter().filter_map(pair).collect()
+    }
+
+    /// Drops contacts of several [`contact_pairs`](Self::contact_pairs) with another part that lie inside a shape of this part of
+    /// another pair, if that meets the touched shape too. The deepest one stays where nothing else overlaps.
+    pub fn drop_buried(&self, other: &FilteredPart<'a>, pose: &Pose, found: &mut Vec<Contact>) {
+        let is_buried = |contact: &Contact| {
+            let Some(met) = self.meeting_shape(other, contact.shapes[1]) else { return false };
+            let Shape::Compound(compound) = &*met else { return false };
+            let at = contact.point + contact.normal * (0.5 * contact.gap);
+            let (at, outward) =
+                (pose.inverse_transform_point(&at.into()).coords, pose.rotation.inverse() * -contact.normal);
+            compound.has_no_contact(contact.shapes[0] as usize, &at, &outward)
+        };
+        let mut deepest: Option<Contact> = None;
+        found.retain(|contact| {
+            let stays = !is_buried(contact);
+            if !stays && deepest.is_none_or(|deepest| contact.gap < deepest.gap) {
+                deepest = Some(*contact);
+            }
+            stays
+        });
+        if found.iter().all(|contact| contact.gap >= 0.0) {
+            found.extend(deepest.filter(|deepest| deepest.gap < 0.0));
+        }
     }
 }
 

@@ -25,7 +25,7 @@ fn a_callback_gets_the_firing_with_its_cause_once_and_after_the_actions() {
     let seen = Arc::new(Mutex::new(Vec::new()));
     let note = seen.clone();
     // the action of the event is done before the callback sees the world
-    let hit = hit.with_action(Action::Velocity {
+    let hit = hit.with_action(Action::SetVelocity {
         body: Subject::Other,
         velocity: Vec3::new(0.0, 0.0, 1.0),
         angular_velocity: Vec3::zeros(),
@@ -56,7 +56,7 @@ fn actions_of_a_callback_are_done_at_once_and_forks_share_the_function() {
     let (mut world, ball, hit) = bouncing();
     let calls = Arc::new(AtomicU32::new(0));
     let count = calls.clone();
-    let up = Action::Velocity { body: Subject::Other, velocity: Vec3::z(), angular_velocity: Vec3::zeros() };
+    let up = Action::SetVelocity { body: Subject::Other, velocity: Vec3::z(), angular_velocity: Vec3::zeros() };
     world
         .add(hit.with_call(move |_, _| {
             count.fetch_add(1, Ordering::Relaxed);

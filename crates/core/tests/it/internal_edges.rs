@@ -41,6 +41,11 @@ enum Floor {
         size: [f64; 2],
         kind: Tile,
     },
+    /// The same as one compound.
+    Compound {
+        size: [f64; 2],
+        kind: Tile,
+    },
 }
 
 /// How a flush box is made.
@@ -169,7 +174,7 @@ impl Floor {
                     _ => Shape::open_mesh(&top, Some(0.2), false).unwrap(),
                 })
             }
-            Floor::HalfSpace | Floor::Boxes { .. } => None,
+            Floor::HalfSpace | Floor::Boxes { .. } | Floor::Compound { .. } => None,
         }
     }
 
@@ -191,6 +196,17 @@ impl Floor {
                 let middle = Vec3::new(FLOOR_START + 0.5 * FLOOR, 0.0, z);
                 let turn = Quat::from_euler_angles(0.0, 0.0, yaw);
                 add_body("floor", shape.clone().unwrap(), Pose::from_parts(middle.into(), turn));
+            }
+            Floor::Compound { size: [length, width], kind } => {
+                let tile = kind.shape(Vec3::new(length, width, 0.2));
+                let counts = [length, width].map(|size| (FLOOR / size).ceil() as usize);
+                let at = |n: usize| {
+                    let x = FLOOR_START + ((n / counts[1]) as f64 + 0.5) * length;
+                    let y = ((n % counts[1]) as f64 + 0.5) * width - 0.5 * FLOOR;
+                    CompoundPart::new(tile.clone(), Pose::translation(x, y, -0.1))
+                };
+                let tiles = Shape::compound((0..counts[0] * counts[1]).map(at).collect()).unwrap();
+                add_body("tiles", tiles, Pose::identity());
             }
             Floor::Boxes { size: [length, width], kind } => {
                 let tile = kind.shape(Vec3::new(length, width, 0.2));
@@ -341,6 +357,15 @@ const ROWS: [Floor; 4] = [
 #[test]
 fn flush_boxes_act_like_a_half_space_full_length() {
     acts_like_a_half_space(if slow() { &ROWS } else { &ROWS[..2] }, 1e-6, |_, _| true);
+}
+
+/// Balls slide and roll over the seams inside a compound that does not move, with their weight on it.
+#[test]
+fn a_compound_of_flush_boxes_acts_like_a_half_space_on_balls_full_length() {
+    let floors = [Tile::Box, Tile::Hull].map(|kind| Floor::Compound { size: [0.25, 0.25], kind });
+    acts_like_a_half_space(if slow() { &floors } else { &floors[..1] }, 1e-6, |mover, _| {
+        matches!(mover, Mover::Sphere)
+    });
 }
 
 /// A wall on the floor is no internal edge: a body that slides to it stops there.

@@ -39,6 +39,7 @@ mod crowds;
 mod drives;
 mod elastic;
 mod events;
+mod filtered_edges;
 mod free;
 mod friction;
 mod hulls;

@@ -408,7 +408,7 @@ fn busy(threads: u32) -> World {
     let add = |world: &mut World, event: ScriptedEvent| world.add(event).unwrap();
     let spawn = Action::spawn(template, Pose::translation(0.05, 0.02, 1.4), Vec3::new(0.4, 0.1, 0.0));
     let spawns = add(&mut world, event("spawns", Trigger::Every { period: 0.21, first: 0.1 }).with_action(spawn));
-    add(&mut world, event("lifts", Trigger::Time { at: 0.3 }).with_action(Action::Move { body: lift, path }));
+    add(&mut world, event("lifts", Trigger::Time { at: 0.3 }).with_action(Action::MoveAlong { body: lift, path }));
     let hits = Trigger::Contact { a: vec![floor], b: shots.clone(), impulse: 0.5 };
     let kick = Action::Push { body: Subject::Other, impulse: Vec3::new(0.0, 0.3, 2.0), point: None };
     let red = Action::Recolor { body: Subject::Other, color: [1.0, 0.2, 0.1] };
@@ -509,7 +509,7 @@ fn wrong_events_are_refused_with_the_reason() {
             "an impulse has a number that is not finite or out of its range",
         ),
         (at(1.0).with_action(Action::Remove(Subject::Other)), "the other body of a trigger that has none"),
-        (at(1.0).with_action(Action::Move { body: ball, path }), "'ball' is not kinematic"),
+        (at(1.0).with_action(Action::MoveAlong { body: ball, path }), "'ball' is not kinematic"),
         (at(1.0).with_action(Action::drive(ball, 0, 1.0)), "'ball' is not a body or joint with a drive"),
         (at(1.0).with_action(Action::spawn(ball, Pose::identity(), Vec3::x())), "'ball' is not a template"),
         (at(1.0).with_action(Action::recolor(ball, [2.0, 0.0, 0.0])), "a color has a number"),

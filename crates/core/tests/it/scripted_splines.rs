@@ -119,7 +119,7 @@ fn a_body_on_a_path_is_on_it_with_its_exact_velocity_and_carries_what_stands_on_
             let path = ends.map(|(time, x)| Keyframe { time, pose: Pose::translation(x, 0.0, -0.5) });
             let path = Arc::new(Spline::new(path.to_vec(), Smoothness::C2, Ends::Rest).unwrap());
             let event = ScriptedEvent::new("event", Trigger::Time { at: 0.5 });
-            world.add(event.with_action(Action::Move { body: lift, path })).unwrap();
+            world.add(event.with_action(Action::MoveAlong { body: lift, path })).unwrap();
             let mut slip = 0.0f64;
             while world.time() < 3.0 - 1e-9 {
                 world.step().unwrap();

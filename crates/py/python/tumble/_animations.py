@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tumble._errors import InvalidValueError, PictureError, UnreadableFileError
+from tumble._keywords import hinted
 
 if TYPE_CHECKING:
     from tumble._native import World
@@ -301,6 +302,7 @@ class Animation:
             page = page.replace(name, value)
         return page
 
+    @hinted
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the page (``.html``) or an animated PNG (``.png``, ``.apng``)."""
         kind = Path(path).suffix.lower()

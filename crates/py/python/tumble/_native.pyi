@@ -1478,7 +1478,8 @@ class ArticulationBuilder:
         armature: inertia of the rotor of a revolute, prismatic or spherical joint, as the joint meets it, kg·m² or kg.
         max_velocity: largest speed of the joint, rad/s or m/s. effort: the force of its motor, N·m or N, which limits drives that name no
         ``max_force``. stiffness, N·m/rad or N/m, and rest, rad or m: a spring. drive: a dict with the arguments of
-        ``Articulation.set_drive``. q, qd: position and velocity of the joint at the start, by its numbers in ``Articulation.q`` and ``qd``: a
+        ``Articulation.set_drive``; or with ``times``, s, and ``values``, rad or m, of a recorded motion, of a spherical joint of shape (n,) or
+        (n, 3), with ``repeat``, by default False, and ``max_force``. q, qd: position and velocity of the joint at the start, by its numbers in ``Articulation.q`` and ``qd``: a
         number of a revolute or prismatic joint; a unit quaternion, shape (4,), and the angular velocity in the axes of the link, shape
         (3,), of a spherical one; position and quaternion in the world, shape (7,), and (6,), of a floating one. A spherical joint has
         settings about each axis of the link: rest and the target of its drive may be rotation vectors, shape (3,), a number is for each

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tumble._errors import InvalidValueError, PictureError
+from tumble._keywords import hinted, hinted_fields
 
 if TYPE_CHECKING:
     from tumble._native import World
 
 
+@hinted_fields
 class Camera(NamedTuple):
     """A pinhole camera at ``eye`` that looks at ``target``."""
 
@@ -29,6 +31,7 @@ class Camera(NamedTuple):
     """Vertical field of view, degrees, above 0 and below 180."""
 
 
+@hinted_fields
 class Appearance(NamedTuple):
     """What a surface looks like: ``World.add_rigid``, ``RigidBody.appearance``. Names and defaults are those of scene files."""
 
@@ -56,6 +59,7 @@ class Appearance(NamedTuple):
     """``"full"``, ``"simplified"``, ``"wireframe"`` or ``"sphere_tree=LEVEL"``."""
 
 
+@hinted
 def save_png(path: str | PathLike[str], picture: ArrayLike) -> None:
     """Writes an image of ``World.render``, shape (height, width, 4), uint8, as a PNG file."""
     data = encode(picture)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tumble._animations import Animation, Shot, instants, write_video
 from tumble._errors import InvalidValueError, UnknownNameError
+from tumble._keywords import hinted
 from tumble._native import World, read_recording, show_contacts
 from tumble._pictures import Camera
 
@@ -94,6 +95,7 @@ class Recording:
         """Returns the orientations of a body, (x, y, z, w), shape (n, 4)."""
         return self.orientations[:, self.index(name)]
 
+    @hinted
     def video(
         self,
         path: str | PathLike[str],
@@ -115,6 +117,7 @@ class Recording:
         else:
             write_video(path, self._shots(world, (width, height), fps, speed, camera), fps)
 
+    @hinted
     def animation(
         self,
         world: World | None = None,
@@ -141,6 +144,7 @@ class Recording:
         return f"<tumble.Recording of {self.world}: {len(self)} frames, {len(self.names)} bodies, until {until}>"
 
 
+@hinted
 def read(path: str | PathLike[str]) -> Recording:
     """Reads a recording of ``Recorder`` or ``tumble run --record``.
 
@@ -154,6 +158,7 @@ def read(path: str | PathLike[str]) -> Recording:
     return Recording(**arrays)
 
 
+@hinted
 def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[World]:
     """Sets a world to each frame of a recording in turn and yields it, the same object each time: ``for world in tumble.replay(path): ...``.
 

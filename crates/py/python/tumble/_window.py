@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tumble._errors import BusyError, InvalidValueError, PictureError
+from tumble._keywords import hinted
 from tumble._native import _show_window, _WindowFeed
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class Window:
             raise PictureError(f"the window: {lines[-1] if lines else f'its process ended with {code}'}")
         return code is None
 
+    @hinted
     def wait(self, timeout: float | None = None) -> bool:
         """Waits until the window is closed, at most ``timeout`` s; returns whether it is closed."""
         end = None if timeout is None else time.monotonic() + timeout

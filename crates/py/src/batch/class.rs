@@ -370,7 +370,9 @@ impl Batch {
     }
 
     /// Returns the world of a number; negative ones count from the end.
-    fn world(&self, py: Python<'_>, index: isize) -> Result<Py<World>> {
+    #[pyo3(signature = (index, **unknown), text_signature = "($self, index)")]
+    fn world(&self, py: Python<'_>, index: isize, unknown: Option<Unknown<'_, '_>>) -> Result<Py<World>> {
+        keywords::check(unknown, "Batch.world")?;
         let _now = self.now()?;
         let count = self.worlds.len() as isize;
         let at = if index < 0 { index + count } else { index };
@@ -416,7 +418,9 @@ impl Batch {
     }
 
     /// Readings of the measuring sensor of that name, shape (n, k): a view of ``state``.
-    fn sensor<'py>(&self, py: Python<'py>, name: &str) -> Result<Bound<'py, PyAny>> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn sensor<'py>(&self, py: Python<'py>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<Bound<'py, PyAny>> {
+        keywords::check(unknown, "Batch.sensor")?;
         let columns = sensors::columns(&self.shared[0], name)?;
         let columns = PySlice::new(py, columns.start as isize, columns.end as isize, 1);
         Ok(self.field(py, Field::State)?.get_item((PySlice::full(py), columns))?)

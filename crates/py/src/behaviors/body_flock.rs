@@ -4,6 +4,7 @@ use crate::arrays::convert::vector;
 use crate::behaviors::flock::{steering, steering_dict};
 use crate::behaviors::placed;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::bodies::handle as handle_of;
 use crate::objects::handle::handle;
 use crate::objects::place::{Found, Place, found};
@@ -71,7 +72,9 @@ impl PyBodyFlock {
 
     /// Adds a rigid body of the world, or an articulation whose first link floats, given as a handle or by name. Gravity acts beside
     /// the flock: a rigid body that no wings carry has ``gravity_scale=0``.
-    fn add(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (body, **unknown), text_signature = "($self, body)")]
+    fn add(&self, py: Python<'_>, body: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "BodyFlock.add")?;
         let place = own_place(&self.place.shared, body)?;
         let steered =
             self.place.shared.read(|inner| Ok(inner.world.object(place.id).is_some_and(BodyFlock::steers)))?;
@@ -91,7 +94,9 @@ impl PyBodyFlock {
     }
 
     /// Removes a body, given as a handle or by name, from the flock. It stays in the world.
-    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (body, **unknown), text_signature = "($self, body)")]
+    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "BodyFlock.remove")?;
         let place = own_place(&self.place.shared, body)?;
         self.change(py, |flock| match flock.release(place.id) {
             true => Ok(()),

@@ -151,7 +151,9 @@ impl PyFlock {
     }
 
     /// Removes a boid, given as a handle or by name, from the flock and from the world.
-    fn remove(&self, py: Python<'_>, boid: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (boid, **unknown), text_signature = "($self, boid)")]
+    fn remove(&self, py: Python<'_>, boid: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "Flock.remove")?;
         let id = self.boid(boid)?;
         self.place.write(py, |inner| Ok(Flock::remove(&mut inner.world, self.place.id, id)?))
     }

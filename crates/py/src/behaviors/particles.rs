@@ -197,14 +197,16 @@ impl Particles {
 
     /// Adds a particle between two steps. position: m, velocity: m/s, shape (3,); life: s, above 0. Returns its number;
     /// None if all places are taken.
-    #[pyo3(signature = (position, velocity=None, life=1.0))]
+    #[pyo3(signature = (position, velocity=None, life=1.0, **unknown), text_signature = "($self, position, velocity=None, life=1.0)")]
     fn spawn(
         &self,
         py: Python<'_>,
         position: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         life: f64,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Option<u64>> {
+        keywords::check(unknown, "ParticleSystem.spawn")?;
         let (position, velocity) = (vec3(position, "position")?, vec3_or(velocity, "velocity", Vec3::zeros())?);
         if !(life > 0.0 && life.is_finite()) {
             return Err(Error::value(format!("life is {life}; it must be above 0")));

@@ -11,6 +11,7 @@ use crate::arrays::whole;
 use crate::errors::{Error, Result};
 use crate::extension::columns::Arrays;
 use crate::extension::layout::Layout;
+use crate::keywords::{self, Unknown};
 use crate::objects::bodies::place_of;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -206,8 +207,14 @@ impl View {
     /// Returns the row of a rigid body, given by name or as a handle. For an articulated body
     /// ``part`` is the name of a link or a row number among its rows. A link that is fixed to
     /// another has the row of that one.
-    #[pyo3(signature = (body, part=None))]
-    fn row(&self, body: &Bound<'_, PyAny>, part: Option<&Bound<'_, PyAny>>) -> Result<usize> {
+    #[pyo3(signature = (body, part=None, **unknown), text_signature = "($self, body, part=None)")]
+    fn row(
+        &self,
+        body: &Bound<'_, PyAny>,
+        part: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<usize> {
+        keywords::check(unknown, "View.row")?;
         let rows = self.row_of(body)?;
         let part = match (part, self.layout.owner(rows.start)) {
             (None, _) => 0,
@@ -224,20 +231,30 @@ impl View {
 
     /// Returns the rows of a body as a slice: one for a rigid body; for an articulated body one for
     /// each moving link, parents first, and one for its base at the end.
-    fn rows<'py>(&self, py: Python<'py>, body: &Bound<'py, PyAny>) -> Result<Bound<'py, PySlice>> {
+    #[pyo3(signature = (body, **unknown), text_signature = "($self, body)")]
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        body: &Bound<'py, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PySlice>> {
+        keywords::check(unknown, "View.rows")?;
         let rows = self.row_of(body)?;
         Ok(PySlice::new(py, rows.start as isize, rows.end as isize, 1))
     }
 
     /// Adds a force, shape (3,), N, on a row at a point of the world, shape (3,), m: with the
     /// torque ``(point - position) × force``.
+    #[pyo3(signature = (row, force, point, **unknown), text_signature = "($self, row, force, point)")]
     fn apply_force(
         &self,
         py: Python<'_>,
         #[pyo3(from_py_with = whole::row)] row: usize,
         force: &Bound<'_, PyAny>,
         point: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "View.apply_force")?;
         self.open()?;
         let (force, point) = (vec3(force, "force")?, vec3(point, "point")?);
         if row >= self.moves.len() {

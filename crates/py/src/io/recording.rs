@@ -110,7 +110,9 @@ impl Recorder {
 
     /// Adds the present frame: visuals, poses, contacts and state. Frames must be added in the order of time,
     /// each once.
-    fn frame(&self, py: Python<'_>, world: &Bound<'_, World>) -> Result<()> {
+    #[pyo3(signature = (world, **unknown), text_signature = "($self, world)")]
+    fn frame(&self, py: Python<'_>, world: &Bound<'_, World>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "Recorder.frame")?;
         let shared = world.get().shared.clone();
         py.detach(|| self.add(&shared))
     }
@@ -131,12 +133,12 @@ impl Recorder {
             return Err(Error::value("every is 0; it must be at least 1"));
         }
         if self.frames() == 0 {
-            self.frame(py, world)?;
+            self.frame(py, world, None)?;
         }
         for k in 1..=n {
             world.get().shared.work(py, |inner| inner.step())?;
             if k % every == 0 {
-                self.frame(py, world)?;
+                self.frame(py, world, None)?;
             }
             py.check_signals()?;
         }

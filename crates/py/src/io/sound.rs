@@ -105,7 +105,14 @@ impl Soundtrack {
     }
 
     /// Steps the world n times and listens to each frame.
-    fn run(&self, py: Python<'_>, #[pyo3(from_py_with = whole::n)] n: u32) -> Result<()> {
+    #[pyo3(signature = (n, **unknown), text_signature = "($self, n)")]
+    fn run(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::n)] n: u32,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "Soundtrack.run")?;
         for _ in 0..n {
             self.shared.work(py, |inner| inner.step())?;
             self.frame(py)?;

@@ -9,6 +9,7 @@
 
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::world::class::World;
 use crate::world::pickling::SceneRecord;
 use pyo3::prelude::*;
@@ -60,19 +61,29 @@ impl _WindowFeed {
     }
 
     /// Returns the first message.
+    #[pyo3(signature = (world, title, size, **unknown), text_signature = "($self, world, title, size)")]
     fn opening<'py>(
         &self,
         py: Python<'py>,
         world: &Bound<'_, World>,
         title: String,
         #[pyo3(from_py_with = whole::size)] size: [u32; 2],
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyBytes>> {
+        keywords::check(unknown, "_WindowFeed.opening")?;
         let scene = world.get().shared.read(|inner| Ok(SceneRecord::of(&inner.scene)))?;
         Ok(PyBytes::new(py, &message(0, 0, 0.0, &seal(HEAD, &Opening { title, size, scene })?)?))
     }
 
     /// Returns the messages of the present state; empty if nothing changed.
-    fn frame<'py>(&self, py: Python<'py>, world: &Bound<'_, World>) -> Result<Bound<'py, PyBytes>> {
+    #[pyo3(signature = (world, **unknown), text_signature = "($self, world)")]
+    fn frame<'py>(
+        &self,
+        py: Python<'py>,
+        world: &Bound<'_, World>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyBytes>> {
+        keywords::check(unknown, "_WindowFeed.frame")?;
         let mut kept = self.publisher.lock().unwrap_or_else(PoisonError::into_inner);
         let (publisher, last, count) = &mut *kept;
         let bytes = world.get().shared.read(|inner| {

@@ -324,14 +324,16 @@ impl Articulation {
     ///
     /// q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
     /// current values.
-    #[pyo3(signature = (q=None, qd=None, tau=None))]
+    #[pyo3(signature = (q=None, qd=None, tau=None, **unknown), text_signature = "($self, q=None, qd=None, tau=None)")]
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
         q: Given<'_, 'py>,
         qd: Given<'_, 'py>,
         tau: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.forward_dynamics")?;
         let mut rows = self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "tau", tau)])?;
         let gravity = self.spot.gravity()?;
         let robot = self.present()?;
@@ -344,14 +346,16 @@ impl Articulation {
     ///
     /// q: (nq,), qd, qdd: (dof,), each optionally batched. Without ``qdd`` the accelerations are
     /// zero.
-    #[pyo3(signature = (q=None, qd=None, qdd=None))]
+    #[pyo3(signature = (q=None, qd=None, qdd=None, **unknown), text_signature = "($self, q=None, qd=None, qdd=None)")]
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
         q: Given<'_, 'py>,
         qd: Given<'_, 'py>,
         qdd: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.inverse_dynamics")?;
         let still = array(py, &vec![0.0; self.robot.dof()]).into_any();
         let mut rows =
             self.rows(&[(Which::Q, "q", q), (Which::Qd, "qd", qd), (Which::Tau, "qdd", Some(qdd.unwrap_or(&still)))])?;
@@ -362,8 +366,14 @@ impl Articulation {
     }
 
     /// Returns the mass matrix, symmetric, shape (dof, dof) or (batch, dof, dof).
-    #[pyo3(signature = (q=None))]
-    fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+    #[pyo3(signature = (q=None, **unknown), text_signature = "($self, q=None)")]
+    fn mass_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.mass_matrix")?;
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
         let robot = self.present()?;
         let out = py.detach(|| robot.mass_matrix(&mut rows))?;
@@ -373,8 +383,15 @@ impl Articulation {
     /// Returns the Jacobian of a link, shape (6, dof) or (batch, 6, dof). ``J @ qd`` is the angular
     /// velocity (first three rows) and the velocity of the origin of the link's frame (last three),
     /// world axes.
-    #[pyo3(signature = (link, q=None))]
-    fn jacobian<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+    #[pyo3(signature = (link, q=None, **unknown), text_signature = "($self, link, q=None)")]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        link: &str,
+        q: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.jacobian")?;
         let frame = self.robot.frame(link)?;
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
         let out = py.detach(|| self.robot.jacobian(frame, &mut rows))?;
@@ -383,16 +400,29 @@ impl Articulation {
 
     /// Returns the poses of all links in the world, in the order of ``link_names``: position, m,
     /// and quaternion (x, y, z, w). Shape (links, 7) or (batch, links, 7).
-    #[pyo3(signature = (q=None))]
-    fn link_poses<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+    #[pyo3(signature = (q=None, **unknown), text_signature = "($self, q=None)")]
+    fn link_poses<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.link_poses")?;
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
         let out = py.detach(|| self.robot.link_poses(&mut rows))?;
         result(py, &rows, out, &[self.robot.model.frames().len(), 7])
     }
 
     /// Returns the pose of one link in the world, shape (7,) or (batch, 7), as in ``link_poses``.
-    #[pyo3(signature = (link, q=None))]
-    fn link_pose<'py>(&self, py: Python<'py>, link: &str, q: Given<'_, 'py>) -> Result<Array<'py>> {
+    #[pyo3(signature = (link, q=None, **unknown), text_signature = "($self, link, q=None)")]
+    fn link_pose<'py>(
+        &self,
+        py: Python<'py>,
+        link: &str,
+        q: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.link_pose")?;
         self.robot.frame(link)?;
         let number = self.robot.model.frames().iter().position(|frame| frame.name == link).unwrap_or(0);
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
@@ -403,8 +433,14 @@ impl Articulation {
     }
 
     /// Returns the center of mass in the world, shape (3,) or (batch, 3), meters.
-    #[pyo3(signature = (q=None))]
-    fn center_of_mass<'py>(&self, py: Python<'py>, q: Given<'_, 'py>) -> Result<Array<'py>> {
+    #[pyo3(signature = (q=None, **unknown), text_signature = "($self, q=None)")]
+    fn center_of_mass<'py>(
+        &self,
+        py: Python<'py>,
+        q: Given<'_, 'py>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Array<'py>> {
+        keywords::check(unknown, "Articulation.center_of_mass")?;
         let mut rows = self.rows(&[(Which::Q, "q", q)])?;
         let robot = self.present()?;
         let out = py.detach(|| robot.center_of_mass(&mut rows))?;
@@ -493,28 +529,46 @@ impl Articulation {
 
     /// Applies a force to a link of a body in a world during the next step only. force: shape (3,),
     /// N; point: where it acts, meters (default: the origin of the link's frame). World axes.
-    #[pyo3(signature = (link, force, point=None))]
-    fn apply_force(&self, py: Python<'_>, link: &str, force: &Bound<'_, PyAny>, point: Given<'_, '_>) -> Result<()> {
+    #[pyo3(signature = (link, force, point=None, **unknown), text_signature = "($self, link, force, point=None)")]
+    fn apply_force(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        force: &Bound<'_, PyAny>,
+        point: Given<'_, '_>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "Articulation.apply_force")?;
         let force = vec3(force, "force")?;
         self.push(py, link, point, |inner, place, part, at| Ok(inner.world.apply_force(place.id, part, force, &at)?))
     }
 
     /// Applies a torque to a link during the next step only. torque: shape (3,), N·m, world axes.
-    fn apply_torque(&self, py: Python<'_>, link: &str, torque: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (link, torque, **unknown), text_signature = "($self, link, torque)")]
+    fn apply_torque(
+        &self,
+        py: Python<'_>,
+        link: &str,
+        torque: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "Articulation.apply_torque")?;
         let torque = vec3(torque, "torque")?;
         self.push(py, link, None, |inner, place, part, _| Ok(inner.world.apply_torque(place.id, part, torque)?))
     }
 
     /// Applies an impulse to a link at once. impulse: shape (3,), N·s; point: as in
     /// ``apply_force``.
-    #[pyo3(signature = (link, impulse, point=None))]
+    #[pyo3(signature = (link, impulse, point=None, **unknown), text_signature = "($self, link, impulse, point=None)")]
     fn apply_impulse(
         &self,
         py: Python<'_>,
         link: &str,
         impulse: &Bound<'_, PyAny>,
         point: Given<'_, '_>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Articulation.apply_impulse")?;
         let impulse = vec3(impulse, "impulse")?;
         self.push(py, link, point, |inner, place, part, at| {
             Ok(inner.world.apply_impulse(place.id, part, impulse, &at)?)

@@ -6,6 +6,7 @@ use crate::arrays::convert::{
 use crate::arrays::whole;
 use crate::choices::{MODES, meaning, word};
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::appearance;
 use crate::objects::description::alone;
 use crate::objects::handle::handle;
@@ -495,8 +496,15 @@ impl RigidBody {
 
     /// Applies a force during the next step only. force: shape (3,), N, world axes; point: where it
     /// acts in the world, meters (default: the center of mass).
-    #[pyo3(signature = (force, point=None))]
-    fn apply_force(&self, py: Python<'_>, force: &Bound<'_, PyAny>, point: Option<&Bound<'_, PyAny>>) -> Result<()> {
+    #[pyo3(signature = (force, point=None, **unknown), text_signature = "($self, force, point=None)")]
+    fn apply_force(
+        &self,
+        py: Python<'_>,
+        force: &Bound<'_, PyAny>,
+        point: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "RigidBody.apply_force")?;
         let (force, point) = (vec3(force, "force")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
             let at = point
@@ -506,20 +514,24 @@ impl RigidBody {
     }
 
     /// Applies a torque during the next step only. torque: shape (3,), N·m, world axes.
-    fn apply_torque(&self, py: Python<'_>, torque: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (torque, **unknown), text_signature = "($self, torque)")]
+    fn apply_torque(&self, py: Python<'_>, torque: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "RigidBody.apply_torque")?;
         let torque = vec3(torque, "torque")?;
         self.place.write(py, |inner| Ok(inner.world.apply_torque(self.place.id, 0, torque)?))
     }
 
     /// Applies an impulse at once. impulse: shape (3,), N·s, world axes; point: where it acts in
     /// the world, meters (default: the center of mass).
-    #[pyo3(signature = (impulse, point=None))]
+    #[pyo3(signature = (impulse, point=None, **unknown), text_signature = "($self, impulse, point=None)")]
     fn apply_impulse(
         &self,
         py: Python<'_>,
         impulse: &Bound<'_, PyAny>,
         point: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "RigidBody.apply_impulse")?;
         let (impulse, point) = (vec3(impulse, "impulse")?, point.map(|p| vec3(p, "point")).transpose()?);
         self.place.write(py, |inner| {
             let at = point
@@ -530,13 +542,15 @@ impl RigidBody {
 
     /// Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
     /// next step. An omitted argument keeps its present value.
-    #[pyo3(signature = (position=None, orientation=None))]
+    #[pyo3(signature = (position=None, orientation=None, **unknown), text_signature = "($self, position=None, orientation=None)")]
     fn move_to(
         &self,
         py: Python<'_>,
         position: Option<&Bound<'_, PyAny>>,
         orientation: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "RigidBody.move_to")?;
         let target = pose(position, orientation)?;
         let (moves, turns) = (position.is_some(), orientation.is_some());
         self.place.write(py, |inner| {
@@ -549,8 +563,14 @@ impl RigidBody {
 
     /// Returns the position of a point of the body in the world. point: shape (3,), in the body's
     /// frame, meters (default: its origin).
-    #[pyo3(signature = (point=None))]
-    fn to_world<'py>(&self, py: Python<'py>, point: Option<&Bound<'_, PyAny>>) -> Result<Bound<'py, PyArray1<f64>>> {
+    #[pyo3(signature = (point=None, **unknown), text_signature = "($self, point=None)")]
+    fn to_world<'py>(
+        &self,
+        py: Python<'py>,
+        point: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyArray1<f64>>> {
+        keywords::check(unknown, "RigidBody.to_world")?;
         let point = vec3_or(point, "point", Vec3::zeros())?;
         Ok(vector(py, &self.place.pose()?.transform_point(&point.into()).coords))
     }

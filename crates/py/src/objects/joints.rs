@@ -12,7 +12,7 @@ use numpy::{IxDyn, PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tumble::collide::Vec3;
-use tumble::dynamics::{ArticulatedBody, DofSettings, Drive};
+use tumble::dynamics::{ArticulatedBody, DofSettings, Drive, Playback};
 
 impl Articulation {
     /// Returns the arguments of an algorithm. Omitted ones have their current values.
@@ -159,14 +159,21 @@ pub fn component(name: &str, value: &Bound<'_, PyAny>, k: usize, count: usize) -
     }
 }
 
-/// Returns the drive of degree of freedom `k` of `count`: target and velocity may have a number for each.
+/// Names of a drive that follows a motion; all other ones but `max_force` are those of a motor.
+const OF_MOTION: [&str; 3] = ["times", "values", "repeat"];
+
+/// Returns the drive of degree of freedom `k` of `count`: target, velocity and values of a motion may have a number for each.
 pub fn drive_at(given: &Bound<'_, PyDict>, effort: f64, k: usize, count: usize) -> Result<Drive> {
     const KEYS: [&str; 5] = ["target", "velocity", "stiffness", "damping", "max_force"];
     let mut values = [None; 5];
     for (key, value) in given {
         let key: String = key.extract()?;
         let Some(index) = KEYS.iter().position(|known| *known == key) else {
-            return Err(Error::value(format!("drive: `{key}` is not known; there are {}", KEYS.join(", "))));
+            if OF_MOTION.contains(&key.as_str()) {
+                continue;
+            }
+            let all = KEYS.iter().chain(&OF_MOTION).copied().collect::<Vec<_>>().join(", ");
+            return Err(Error::value(format!("drive: `{key}` is not known; there are {all}")));
         };
         values[index] = match (index, value.is_none()) {
             (_, true) => None,
@@ -174,6 +181,42 @@ pub fn drive_at(given: &Bound<'_, PyDict>, effort: f64, k: usize, count: usize) 
             _ => value.extract()?,
         };
     }
-    let [target, velocity, stiffness, damping, max_force] = values;
-    drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), max_force.unwrap_or(effort))
+    let limit = values[4].unwrap_or(effort);
+    if let Some(motion) = motion_at(given, k, count)? {
+        if let Some(index) = (0..4).find(|index| values[*index].is_some()) {
+            let key = KEYS[index];
+            return Err(Error::value(format!(
+                "drive: `{key}` does not go with `times`: the motion says where the joint is"
+            )));
+        }
+        return Ok(Drive::Playback { motion: motion.into(), limit });
+    }
+    let [target, velocity, stiffness, damping, _] = values;
+    drive(target, velocity, stiffness.unwrap_or(0.0), damping.unwrap_or(0.0), limit)
+}
+
+/// Returns the motion that a drive follows; `None` without one.
+fn motion_at(given: &Bound<'_, PyDict>, k: usize, count: usize) -> Result<Option<Playback>> {
+    let get = |key: &str| Ok::<_, Error>(given.get_item(key)?.filter(|value| !value.is_none()));
+    let [times, values, repeat] = [get("times")?, get("values")?, get("repeat")?];
+    let (times, values) = match (times, values) {
+        (Some(times), Some(values)) => (numbers(&times, "times")?, numbers(&values, "values")?),
+        (None, None) if repeat.is_none() => return Ok(None),
+        _ => return Err(Error::value("drive: a motion needs `times` and `values`")),
+    };
+    let rows = times.data.len();
+    let column = match values.shape.as_slice() {
+        [n] if *n == rows => values.data,
+        [n, each] if *n == rows && *each == count => values.data.iter().skip(k).step_by(count).copied().collect(),
+        shape => {
+            let more = if count > 1 { format!(" or ({rows}, {count})") } else { String::new() };
+            return Err(Error::value(format!(
+                "values: expected shape ({rows},){more}, as `times`, got {}",
+                shown(shape)
+            )));
+        }
+    };
+    let repeats = repeat.map_or(Ok(false), |repeat| repeat.extract::<bool>())?;
+    let motion = if repeats { Playback::repeating(times.data, column) } else { Playback::new(times.data, column) };
+    motion.map(Some).map_err(|why| Error::value(format!("drive: {why}")))
 }

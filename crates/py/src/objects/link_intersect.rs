@@ -1,6 +1,7 @@
 //! Intersection tests of links.
 
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::articulation::Articulation;
 use crate::objects::shape_material::Which;
 use pyo3::prelude::*;
@@ -12,14 +13,16 @@ impl Articulation {
     ///
     /// test: an object of a subclass of ``tumble.Intersect``, or None. shape: one shape only, by name or number as ``shapes`` of
     /// contacts has it; the whole compound for a part of one. Shapes of other links that are fixed to it are not meant.
-    #[pyo3(signature = (link, test, shape=None))]
+    #[pyo3(signature = (link, test, shape=None, **unknown), text_signature = "($self, link, test, shape=None)")]
     fn set_intersect(
         &self,
         py: Python<'_>,
         link: &str,
         test: Option<&Bound<'_, PyAny>>,
         shape: Option<Which>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "Articulation.set_intersect")?;
         if let Some(test) = test {
             py.import("tumble._extension")?.call_method1("check_intersect", (test,))?;
         }

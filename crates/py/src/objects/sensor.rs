@@ -2,6 +2,7 @@
 
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
+use crate::keywords::{self, Unknown};
 use crate::objects::handle::handle;
 use crate::objects::place::Place;
 use crate::world::gc::{Anchor, anchor};
@@ -38,7 +39,14 @@ impl Sensor {
     }
 
     /// Starts its noise anew from a seed, a whole number of at most 64 bits. The reading and the bias stay.
-    fn seed(&self, py: Python<'_>, #[pyo3(from_py_with = whole::seed)] seed: u64) -> Result<()> {
+    #[pyo3(signature = (seed, **unknown), text_signature = "($self, seed)")]
+    fn seed(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::seed)] seed: u64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "Sensor.seed")?;
         self.place.write(py, |inner| Ok(inner.world.seed_sensor(self.place.id, seed)?))
     }
 }
@@ -97,7 +105,9 @@ impl Sensors {
     }
 
     /// The handle of a sensor, for its kind and its seed.
-    fn handle(&self, py: Python<'_>, name: &str) -> Result<Sensor> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn handle(&self, py: Python<'_>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<Sensor> {
+        keywords::check(unknown, "Sensors.handle")?;
         Sensor::new(py, sensors::place_by_name(&self.shared, name)?)
     }
 

@@ -64,7 +64,14 @@ impl RigidBody {
     /// Returns what one shape collides with: a dict by the names of ``set_shape_filter``, with the mask as the bits of an integer.
     ///
     /// shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
-    fn shape_filter<'py>(&self, py: Python<'py>, shape: Which) -> Result<Bound<'py, PyDict>> {
+    #[pyo3(signature = (shape, **unknown), text_signature = "($self, shape)")]
+    fn shape_filter<'py>(
+        &self,
+        py: Python<'py>,
+        shape: Which,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyDict>> {
+        keywords::check(unknown, "RigidBody.shape_filter")?;
         let shape = self.part_of_compound(shape)?;
         as_dict(py, self.constant(|body| body.shape_filter(shape))?)
     }
@@ -96,7 +103,15 @@ impl Articulation {
     /// integer.
     ///
     /// shape: name, or number as ``shapes`` of contacts has it.
-    fn shape_filter<'py>(&self, py: Python<'py>, link: &str, shape: Which) -> Result<Bound<'py, PyDict>> {
+    #[pyo3(signature = (link, shape, **unknown), text_signature = "($self, link, shape)")]
+    fn shape_filter<'py>(
+        &self,
+        py: Python<'py>,
+        link: &str,
+        shape: Which,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyDict>> {
+        keywords::check(unknown, "Articulation.shape_filter")?;
         let (part, shape) = self.of_link(link, shape)?;
         let found = self.of_body(|body| body.shape_filter(part, shape))?;
         as_dict(py, found.unwrap_or_default())

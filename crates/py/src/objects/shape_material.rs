@@ -2,7 +2,7 @@
 
 use crate::arrays::convert::{array, some};
 use crate::errors::{Error, Result};
-use crate::keywords::refusal;
+use crate::keywords::{self, Unknown, refusal};
 use crate::objects::articulation::Articulation;
 use crate::objects::body::RigidBody;
 use pyo3::exceptions::PyTypeError;
@@ -120,7 +120,14 @@ impl RigidBody {
     /// Returns the surface constants of one shape: a dict by the names of ``set_shape_material``.
     ///
     /// shape: name, or index of the part of a ``Compound``, as ``shapes`` of contacts has it.
-    fn shape_material<'py>(&self, py: Python<'py>, shape: Which) -> Result<Bound<'py, PyDict>> {
+    #[pyo3(signature = (shape, **unknown), text_signature = "($self, shape)")]
+    fn shape_material<'py>(
+        &self,
+        py: Python<'py>,
+        shape: Which,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyDict>> {
+        keywords::check(unknown, "RigidBody.shape_material")?;
         let shape = self.numbered(shape)?;
         as_dict(py, &self.constant(|body| body.shape_material(shape))?)
     }
@@ -196,7 +203,15 @@ impl Articulation {
     /// Returns the surface constants of one shape of a link: a dict by the names of ``set_shape_material``.
     ///
     /// shape: name, or number as ``shapes`` of contacts has it.
-    fn shape_material<'py>(&self, py: Python<'py>, link: &str, shape: Which) -> Result<Bound<'py, PyDict>> {
+    #[pyo3(signature = (link, shape, **unknown), text_signature = "($self, link, shape)")]
+    fn shape_material<'py>(
+        &self,
+        py: Python<'py>,
+        link: &str,
+        shape: Which,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Bound<'py, PyDict>> {
+        keywords::check(unknown, "Articulation.shape_material")?;
         let (part, shape) = self.of_link(link, shape)?;
         let found = self.of_body(|body| body.shape_material(part, shape))?;
         as_dict(py, &found.unwrap_or_default())

@@ -87,7 +87,9 @@ impl Shape {
     /// Returns the same shape with a name, by which contacts, hits and events report it.
     ///
     /// The shapes of one body, or of one link, must have different names. A ``Compound`` has no name: its parts have.
-    fn named(&self, py: Python<'_>, name: &str) -> Result<Py<PyAny>> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn named(&self, py: Python<'_>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<Py<PyAny>> {
+        keywords::check(unknown, "Shape.named")?;
         if name.is_empty() || matches!(self.solid, Solid::Compound(_)) {
             let expected = "expected a name that is not empty, of a shape that is no Compound, whose parts have names";
             return Err(Error::value(format!("named('{name}') of {}: {expected}", self.words)));
@@ -115,7 +117,9 @@ pub struct Sphere;
 #[pymethods]
 impl Sphere {
     #[new]
-    fn new(radius: f64) -> Result<PyClassInitializer<Sphere>> {
+    #[pyo3(signature = (radius, **unknown), text_signature = "(radius)")]
+    fn new(radius: f64, unknown: Option<Unknown<'_, '_>>) -> Result<PyClassInitializer<Sphere>> {
+        keywords::check(unknown, "Sphere")?;
         Ok(Shape::new(Solid::sphere(radius)?, format!("Sphere(radius={radius})")).into_a(Sphere))
     }
 }
@@ -159,7 +163,9 @@ pub struct Capsule;
 #[pymethods]
 impl Capsule {
     #[new]
-    fn new(radius: f64, length: f64) -> Result<PyClassInitializer<Capsule>> {
+    #[pyo3(signature = (radius, length, **unknown), text_signature = "(radius, length)")]
+    fn new(radius: f64, length: f64, unknown: Option<Unknown<'_, '_>>) -> Result<PyClassInitializer<Capsule>> {
+        keywords::check(unknown, "Capsule")?;
         let solid = Solid::capsule(radius, checked_length(length)?)?;
         Ok(Shape::new(solid, format!("Capsule(radius={radius}, length={length})")).into_a(Capsule))
     }
@@ -201,12 +207,14 @@ pub struct Ellipsoid;
 #[pymethods]
 impl Ellipsoid {
     #[new]
-    #[pyo3(signature = (size, y=None, z=None))]
+    #[pyo3(signature = (size, y=None, z=None, **unknown), text_signature = "(size, y=None, z=None)")]
     fn new(
         size: &Bound<'_, PyAny>,
         y: Option<&Bound<'_, PyAny>>,
         z: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<Ellipsoid>> {
+        keywords::check(unknown, "Ellipsoid")?;
         let size = three_sizes("Ellipsoid", size, [y, z])?;
         let [x, y, z] = size;
         let solid = Solid::ellipsoid(Vec3::from(size))?;
@@ -222,7 +230,9 @@ pub struct Cone;
 #[pymethods]
 impl Cone {
     #[new]
-    fn new(radius: f64, height: f64) -> Result<PyClassInitializer<Cone>> {
+    #[pyo3(signature = (radius, height, **unknown), text_signature = "(radius, height)")]
+    fn new(radius: f64, height: f64, unknown: Option<Unknown<'_, '_>>) -> Result<PyClassInitializer<Cone>> {
+        keywords::check(unknown, "Cone")?;
         let solid = Solid::cone(radius, height)?;
         Ok(Shape::new(solid, format!("Cone(radius={radius}, height={height})")).into_a(Cone))
     }
@@ -267,8 +277,13 @@ pub struct HalfSpace;
 #[pymethods]
 impl HalfSpace {
     #[new]
-    #[pyo3(signature = (normal=None, offset=0.0), text_signature = "(normal=(0.0, 0.0, 1.0), offset=0.0)")]
-    fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> Result<PyClassInitializer<HalfSpace>> {
+    #[pyo3(signature = (normal=None, offset=0.0, **unknown), text_signature = "(normal=(0.0, 0.0, 1.0), offset=0.0)")]
+    fn new(
+        normal: Option<&Bound<'_, PyAny>>,
+        offset: f64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<PyClassInitializer<HalfSpace>> {
+        keywords::check(unknown, "HalfSpace")?;
         let given = direction_or(normal, "normal", Vec3::z())?;
         let offset = number(offset, "offset")?;
         let largest = given.amax();
@@ -371,7 +386,9 @@ pub struct Compound;
 #[pymethods]
 impl Compound {
     #[new]
-    fn new(parts: Vec<Bound<'_, PyAny>>) -> Result<PyClassInitializer<Compound>> {
+    #[pyo3(signature = (parts, **unknown), text_signature = "(parts)")]
+    fn new(parts: Vec<Bound<'_, PyAny>>, unknown: Option<Unknown<'_, '_>>) -> Result<PyClassInitializer<Compound>> {
+        keywords::check(unknown, "Compound")?;
         let count = parts.len();
         let parts = parts.iter().enumerate().map(|(n, part)| compound_part(n, part)).collect::<Result<_>>()?;
         Ok(Shape::new(Solid::compound(parts)?, format!("Compound({count} parts)")).into_a(Compound))

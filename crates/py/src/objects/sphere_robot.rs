@@ -151,8 +151,14 @@ impl SphereRobot {
     ///
     /// positions: positions of joints by name, rad or m; others are at 0, or at the limit next to it. A name
     /// that is no joint with one degree of freedom raises ``InvalidValueError``.
-    #[pyo3(signature = (positions=None))]
-    fn overlaps(&self, py: Python<'_>, positions: Option<JointPositions>) -> Result<Vec<(String, String, f64, bool)>> {
+    #[pyo3(signature = (positions=None, **unknown), text_signature = "($self, positions=None)")]
+    fn overlaps(
+        &self,
+        py: Python<'_>,
+        positions: Option<JointPositions>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Vec<(String, String, f64, bool)>> {
+        keywords::check(unknown, "SphereRobot.overlaps")?;
         let found = py.detach(|| self.robot.overlaps(&positions.unwrap_or_default())).map_err(Error::value)?;
         let name = |link: usize| self.name_of(link).to_owned();
         Ok(found.iter().map(|o| (name(o.links[0]), name(o.links[1]), o.depth, o.adjacent)).collect())
@@ -163,13 +169,15 @@ impl SphereRobot {
     /// of ``sample_poses`` poses, which are evenly distributed within the limits.
     ///
     /// poses: dicts as in ``overlaps``, at most 1,000,000 with the samples.
-    #[pyo3(signature = (poses=None, sample_poses=0))]
+    #[pyo3(signature = (poses=None, sample_poses=0, **unknown), text_signature = "($self, poses=None, sample_poses=0)")]
     fn ignored_pairs(
         &self,
         py: Python<'_>,
         poses: Option<Vec<JointPositions>>,
         #[pyo3(from_py_with = whole::sample_poses)] sample_poses: usize,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Vec<(String, String)>> {
+        keywords::check(unknown, "SphereRobot.ignored_pairs")?;
         let free = poses.unwrap_or_default();
         let found = py.detach(|| self.robot.ignored_pairs(&free, &self.robot.sample_poses(sample_poses, 0)));
         let name = |link: usize| self.name_of(link).to_owned();

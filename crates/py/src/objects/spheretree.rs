@@ -146,7 +146,9 @@ impl SphereTree {
     /// Reads a tree that ``save`` or ``tumble spheretree --output`` wrote. Any other file raises
     /// ``InvalidValueError`` with the reason.
     #[staticmethod]
-    fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<SphereTree> {
+    #[pyo3(signature = (path, **unknown), text_signature = "(path)")]
+    fn load(py: Python<'_>, path: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<SphereTree> {
+        keywords::check(unknown, "SphereTree.load")?;
         let path = self::path(path)?;
         py.detach(|| {
             let text = std::fs::read_to_string(&path)
@@ -159,7 +161,9 @@ impl SphereTree {
     }
 
     /// Writes the tree and its metrics as JSON: the file of ``tumble spheretree --output``.
-    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (path, **unknown), text_signature = "($self, path)")]
+    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "SphereTree.save")?;
         let (path, file): (PathBuf, TreeFile) = (self::path(path)?, self.whole(py)?);
         py.detach(|| {
             std::fs::write(&path, file.to_json())
@@ -259,8 +263,9 @@ impl SphereTree {
 
     /// Returns the metrics as the table that ``tumble spheretree`` prints. verbose: with more
     /// columns and the work of the builder's stages.
-    #[pyo3(signature = (verbose=false))]
-    fn report(&self, py: Python<'_>, verbose: bool) -> Result<String> {
+    #[pyo3(signature = (verbose=false, **unknown), text_signature = "($self, verbose=False)")]
+    fn report(&self, py: Python<'_>, verbose: bool, unknown: Option<Unknown<'_, '_>>) -> Result<String> {
+        keywords::check(unknown, "SphereTree.report")?;
         Ok(self.whole(py)?.table(verbose))
     }
 

@@ -222,12 +222,15 @@ pub struct Sdf;
 #[pymethods]
 impl Sdf {
     #[new]
+    #[pyo3(signature = (values, low, high, **unknown), text_signature = "(values, low, high)")]
     fn new(
         py: Python<'_>,
         values: &Bound<'_, PyAny>,
         low: &Bound<'_, PyAny>,
         high: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<PyClassInitializer<Sdf>> {
+        keywords::check(unknown, "Sdf")?;
         let corners = [some::<3>(low, "low")?, some::<3>(high, "high")?].map(Vec3::from);
         let (grid, place) = match values.extract::<std::path::PathBuf>() {
             Ok(file) => {

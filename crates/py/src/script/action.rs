@@ -94,33 +94,41 @@ impl Action {
 
     /// Sets the velocity of a rigid body, m/s, and its angular velocity, rad/s.
     #[staticmethod]
-    #[pyo3(signature = (body, velocity=None, angular_velocity=None))]
+    #[pyo3(signature = (body, velocity=None, angular_velocity=None, **unknown), text_signature = "(body, velocity=None, angular_velocity=None)")]
     fn set_velocity(
         body: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Action> {
+        keywords::check(unknown, "Action.set_velocity")?;
         let velocity = vec3_or(velocity, "velocity", Vec3::zeros())?;
         let angular_velocity = vec3_or(angular_velocity, "angular_velocity", Vec3::zeros())?;
-        Ok(Action { deed: Deed::Velocity { body: subject(body), velocity, angular_velocity } })
+        Ok(Action { deed: Deed::SetVelocity { body: subject(body), velocity, angular_velocity } })
     }
 
     /// Disables a body. A body of a template can be spawned again.
     #[staticmethod]
-    fn remove(body: &Bound<'_, PyAny>) -> Action {
-        Action { deed: Deed::Remove(subject(body)) }
+    #[pyo3(signature = (body, **unknown), text_signature = "(body)")]
+    fn remove(body: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.remove")?;
+        Ok(Action { deed: Deed::Remove(subject(body)) })
     }
 
     /// Enables a body, a joint or an event.
     #[staticmethod]
-    fn enable(object: Given) -> Action {
-        Action { deed: Deed::Enable(object) }
+    #[pyo3(signature = (object, **unknown), text_signature = "(object)")]
+    fn enable(object: Given, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.enable")?;
+        Ok(Action { deed: Deed::Enable(object) })
     }
 
     /// Disables a body, a joint or an event.
     #[staticmethod]
-    fn disable(object: Given) -> Action {
-        Action { deed: Deed::Disable(object) }
+    #[pyo3(signature = (object, **unknown), text_signature = "(object)")]
+    fn disable(object: Given, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.disable")?;
+        Ok(Action { deed: Deed::Disable(object) })
     }
 
     /// Enables a joint of ``World.add_joint``. here: joins its sides where they are at that moment.
@@ -133,13 +141,17 @@ impl Action {
 
     /// Disables a joint.
     #[staticmethod]
-    fn detach(joint: Given) -> Action {
-        Action { deed: Deed::Disable(joint) }
+    #[pyo3(signature = (joint, **unknown), text_signature = "(joint)")]
+    fn detach(joint: Given, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.detach")?;
+        Ok(Action { deed: Deed::Disable(joint) })
     }
 
     /// Gives a body another color, sRGB, each 0 to 1.
     #[staticmethod]
-    fn recolor(body: &Bound<'_, PyAny>, color: &Bound<'_, PyAny>) -> Result<Action> {
+    #[pyo3(signature = (body, color, **unknown), text_signature = "(body, color)")]
+    fn recolor(body: &Bound<'_, PyAny>, color: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<Action> {
+        keywords::check(unknown, "Action.recolor")?;
         let color = self::color(color)?.map(|share| share as f32);
         Ok(Action { deed: Deed::Recolor { body: subject(body), color } })
     }
@@ -171,7 +183,7 @@ impl Action {
         let frames: Vec<Keyframe> = (0..n).map(frame).collect();
         let (smoothness, ends) = (meaning("smoothness", smoothness, SMOOTHNESS)?, meaning("ends", ends, ENDS)?);
         let path = Spline::new(frames, smoothness, ends).map_err(|e| Error::value(format!("the path: {e}")))?;
-        Ok(Action { deed: Deed::Move { body, path: Arc::new(path) } })
+        Ok(Action { deed: Deed::MoveAlong { body, path: Arc::new(path) } })
     }
 
     /// Sets the target of a drive, rad, m, rad/s or m/s as the drive has it. joint: a joint of ``World.add_joint``, or
@@ -230,13 +242,13 @@ impl Action {
             Deed::Spawn { .. } => "spawn",
             Deed::Push { .. } => "push",
             Deed::Force { .. } => "force",
-            Deed::Velocity { .. } => "set_velocity",
+            Deed::SetVelocity { .. } => "set_velocity",
             Deed::Remove(_) => "remove",
             Deed::Enable(_) => "enable",
             Deed::Disable(_) => "disable",
             Deed::Attach { .. } => "attach",
             Deed::Recolor { .. } => "recolor",
-            Deed::Move { .. } => "move_along",
+            Deed::MoveAlong { .. } => "move_along",
             Deed::Drive { .. } => "drive",
             Deed::Camera(_) => "camera",
             Deed::Light(_) => "light",

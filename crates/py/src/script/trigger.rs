@@ -20,8 +20,10 @@ pub struct Trigger {
 impl Trigger {
     /// Once, at the end of the first frame that reaches a time. at: s.
     #[staticmethod]
-    fn time(at: f64) -> Trigger {
-        Trigger { law: Law::Time { at } }
+    #[pyo3(signature = (at, **unknown), text_signature = "(at)")]
+    fn time(at: f64, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.time")?;
+        Ok(Trigger { law: Law::Time { at } })
     }
 
     /// Again and again. period: s. first: time of the first firing, s, by default the period.
@@ -48,62 +50,82 @@ impl Trigger {
 
     /// A body of a and one of b are in contact, in every step after the one in which they came into contact; not while they sleep.
     #[staticmethod]
-    #[pyo3(signature = (a, b=None))]
-    fn touching(a: &Bound<'_, PyAny>, b: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (a, b=None, **unknown), text_signature = "(a, b=None)")]
+    fn touching(
+        a: &Bound<'_, PyAny>,
+        b: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.touching")?;
         Ok(Trigger { law: Law::Touching { a: several(Some(a))?, b: several(b)? } })
     }
 
     /// A body of a and one of b part.
     #[staticmethod]
-    #[pyo3(signature = (a, b=None))]
-    fn parting(a: &Bound<'_, PyAny>, b: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (a, b=None, **unknown), text_signature = "(a, b=None)")]
+    fn parting(
+        a: &Bound<'_, PyAny>,
+        b: Option<&Bound<'_, PyAny>>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.parting")?;
         Ok(Trigger { law: Law::Parting { a: several(Some(a))?, b: several(b)? } })
     }
 
     /// A body enters a sensor (``sensor=True`` of ``add_rigid`` and ``add_static``); without bodies any one counts. It is the *other* body of the event.
     #[staticmethod]
-    #[pyo3(signature = (sensor, bodies=None))]
-    fn enters(sensor: Given, bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (sensor, bodies=None, **unknown), text_signature = "(sensor, bodies=None)")]
+    fn enters(sensor: Given, bodies: Option<&Bound<'_, PyAny>>, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.enters")?;
         Ok(Trigger { law: Law::Enters { sensor, bodies: several(bodies)? } })
     }
 
     /// A body leaves a sensor.
     #[staticmethod]
-    #[pyo3(signature = (sensor, bodies=None))]
-    fn leaves(sensor: Given, bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (sensor, bodies=None, **unknown), text_signature = "(sensor, bodies=None)")]
+    fn leaves(sensor: Given, bodies: Option<&Bound<'_, PyAny>>, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.leaves")?;
         Ok(Trigger { law: Law::Leaves { sensor, bodies: several(bodies)? } })
     }
 
     /// A body falls asleep; without bodies any one counts. It is the *other* body of the event.
     #[staticmethod]
-    #[pyo3(signature = (bodies=None))]
-    fn asleep(bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (bodies=None, **unknown), text_signature = "(bodies=None)")]
+    fn asleep(bodies: Option<&Bound<'_, PyAny>>, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.asleep")?;
         Ok(Trigger { law: Law::Asleep { bodies: several(bodies)? } })
     }
 
     /// A body wakes in a step, not between two steps; without bodies any one counts. It is the *other* body of the event.
     #[staticmethod]
-    #[pyo3(signature = (bodies=None))]
-    fn awake(bodies: Option<&Bound<'_, PyAny>>) -> Result<Trigger> {
+    #[pyo3(signature = (bodies=None, **unknown), text_signature = "(bodies=None)")]
+    fn awake(bodies: Option<&Bound<'_, PyAny>>, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.awake")?;
         Ok(Trigger { law: Law::Awake { bodies: several(bodies)? } })
     }
 
     /// A joint of ``World.add_joint`` breaks.
     #[staticmethod]
-    fn broken(joint: Given) -> Trigger {
-        Trigger { law: Law::Breaks { joint } }
+    #[pyo3(signature = (joint, **unknown), text_signature = "(joint)")]
+    fn broken(joint: Given, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.broken")?;
+        Ok(Trigger { law: Law::Breaks { joint } })
     }
 
     /// A user presses a key in a window or in a cave, or a program calls ``World.press``.
     #[staticmethod]
-    fn key(key: String) -> Trigger {
-        Trigger { law: Law::Key { key } }
+    #[pyo3(signature = (key, **unknown), text_signature = "(key)")]
+    fn key(key: String, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.key")?;
+        Ok(Trigger { law: Law::Key { key } })
     }
 
     /// An event that was added before fires. The *other* body is that of it.
     #[staticmethod]
-    fn after(event: Given) -> Trigger {
-        Trigger { law: Law::Fired { event } }
+    #[pyo3(signature = (event, **unknown), text_signature = "(event)")]
+    fn after(event: Given, unknown: Option<Unknown<'_, '_>>) -> Result<Trigger> {
+        keywords::check(unknown, "Trigger.after")?;
+        Ok(Trigger { law: Law::Fired { event } })
     }
 
     fn __repr__(&self) -> &'static str {

@@ -98,7 +98,9 @@ impl World {
     }
 
     /// Presses a key for the events that wait for it; they fire at the end of the next step. Returns whether there are any.
-    fn press(&self, py: Python<'_>, key: &str) -> Result<bool> {
+    #[pyo3(signature = (key, **unknown), text_signature = "($self, key)")]
+    fn press(&self, py: Python<'_>, key: &str, unknown: Option<Unknown<'_, '_>>) -> Result<bool> {
+        keywords::check(unknown, "World.press")?;
         self.shared.write(py, |inner| Ok(inner.world.press(key)))
     }
 }

@@ -178,7 +178,9 @@ impl World {
 
     /// Builds the world of a scene from the text of its file.
     #[staticmethod]
-    fn parse(py: Python<'_>, text: &str) -> Result<World> {
+    #[pyo3(signature = (text, **unknown), text_signature = "(text)")]
+    fn parse(py: Python<'_>, text: &str, unknown: Option<Unknown<'_, '_>>) -> Result<World> {
+        keywords::check(unknown, "World.parse")?;
         World::of(py, py.detach(|| pool::run(|| build(SceneFile::parse(text, "scene.toml")?)))?)
     }
 
@@ -197,8 +199,14 @@ impl World {
     /// between two steps.
     ///
     /// After a ``StepError`` the world is as before the step that failed; earlier steps are kept.
-    #[pyo3(signature = (n=1))]
-    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole::n)] n: i64) -> Result<()> {
+    #[pyo3(signature = (n=1, **unknown), text_signature = "($self, n=1)")]
+    fn step(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::n)] n: i64,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "World.step")?;
         let Ok(mut left) = u64::try_from(n) else {
             return Err(Error::value(format!("n is {n}; it must be at least 0")));
         };

@@ -13,9 +13,10 @@ use crate::parse::rotation;
 use crate::parse::view::CameraSpec;
 
 /// The keys that say what is done, of which an entry has one.
-const WHAT: [&str; 13] = [
+const WHAT: [&str; 14] = [
     "spawn",
     "push",
+    "force",
     "set_velocity",
     "remove",
     "enable",
@@ -23,7 +24,7 @@ const WHAT: [&str; 13] = [
     "attach",
     "detach",
     "recolor",
-    "move",
+    "move_along",
     "drive",
     "camera",
     "light",
@@ -59,9 +60,10 @@ pub(crate) fn read_action(
     let action = match key {
         "spawn" => read_spawn(&mut f, names),
         "push" => read_push(&mut f, names, others),
+        "force" => read_force(&mut f, names, others),
         "set_velocity" => read_who(&mut f, key, names, others).map(|body| {
             let [velocity, angular_velocity] = read_velocities(&mut f);
-            Action::Velocity { body, velocity, angular_velocity }
+            Action::SetVelocity { body, velocity, angular_velocity }
         }),
         "remove" => read_who(&mut f, key, names, others).map(Action::Remove),
         "enable" => read_object(&mut f, key, names).map(Action::Enable),
@@ -80,7 +82,7 @@ pub(crate) fn read_action(
             let color = read_color(&mut f, "color", [1.0; 3]).map(|c| c as f32);
             body.map(|body| Action::Recolor { body, color })
         }
-        "move" => read_move(&mut f, names),
+        "move_along" => read_move(&mut f, names),
         "drive" => {
             let in_degrees = f.value("target_deg").is_some();
             let dof = read_dof(&mut f);
@@ -165,20 +167,26 @@ fn read_spawn(f: &mut Fields<'_>, names: &ObjectNames) -> Option<Action<String>>
 
 fn read_push(f: &mut Fields<'_>, names: &ObjectNames, others: (bool, bool)) -> Option<Action<String>> {
     let body = read_who(f, "push", names, others);
-    if f.value("duration_s").is_some() || f.value("force_n").is_some() {
-        let force = Vec3::from(f.vector_or("force_n", Bound::ANY, [0.0; 3]));
-        let torque = Vec3::from(f.vector_or("torque_n_m", Bound::ANY, [0.0; 3]));
-        let duration = f.number("duration_s", Bound::POSITIVE);
-        return Some(Action::Force { body: body?, force, torque, duration });
+    if let (Some(value), None) = (f.value("force_n"), f.value("impulse_n_s")) {
+        f.wrong("force_n", value, "`impulse_n_s`, or `force = \"BODY\"` instead of `push`");
+        return None;
     }
     let impulse = Vec3::from(f.vector("impulse_n_s", Bound::ANY));
     let point = f.optional_vector("point_m", Bound::ANY).map(Vec3::from);
     Some(Action::Push { body: body?, impulse, point })
 }
 
+fn read_force(f: &mut Fields<'_>, names: &ObjectNames, others: (bool, bool)) -> Option<Action<String>> {
+    let body = read_who(f, "force", names, others);
+    let force = Vec3::from(f.vector_or("force_n", Bound::ANY, [0.0; 3]));
+    let torque = Vec3::from(f.vector_or("torque_n_m", Bound::ANY, [0.0; 3]));
+    let duration = f.number("duration_s", Bound::POSITIVE);
+    Some(Action::Force { body: body?, force, torque, duration })
+}
+
 fn read_move(f: &mut Fields<'_>, names: &ObjectNames) -> Option<Action<String>> {
     let right = |kind| matches!(kind, ObjectKind::Body { mode: Mode::Kinematic, .. });
-    let body = names.read(f, "move", right, "the name of a body with mode = \"kinematic\"");
+    let body = names.read(f, "move_along", right, "the name of a body with mode = \"kinematic\"");
     let smoothness = f.choice_or("smoothness", SMOOTHNESS, Smoothness::C2);
     let ends = f.choice_or("ends", ENDS, Ends::Rest);
     let problems = f.log.count();
@@ -197,7 +205,7 @@ fn read_move(f: &mut Fields<'_>, names: &ObjectNames) -> Option<Action<String>> 
         return None;
     }
     match Spline::new(keyframes, smoothness, ends) {
-        Ok(path) => Some(Action::Move { body: body?, path: Arc::new(path) }),
+        Ok(path) => Some(Action::MoveAlong { body: body?, path: Arc::new(path) }),
         Err(why) => {
             let place = f.value("keyframes").map_or(f.span.clone(), |value| value.span());
             let (fault, expected) = match why.to_string().split_once("; ") {

@@ -110,13 +110,13 @@ impl Writer<'_> {
                 t
             }
             Action::Force { body, force, torque, duration } => {
-                let mut t = Table::of("push", who(body)?);
+                let mut t = Table::of("force", who(body)?);
                 t.put("force_n", *force);
                 t.put("torque_n_m", *torque);
                 t.put("duration_s", *duration);
                 t
             }
-            Action::Velocity { body, velocity, angular_velocity } => {
+            Action::SetVelocity { body, velocity, angular_velocity } => {
                 let mut t = Table::of("set_velocity", who(body)?);
                 t.extend(velocities(velocity, angular_velocity));
                 t
@@ -134,8 +134,8 @@ impl Writer<'_> {
                 t.put("color", *color);
                 t
             }
-            Action::Move { body, path } => {
-                let mut t = Table::of("move", name(body)?);
+            Action::MoveAlong { body, path } => {
+                let mut t = Table::of("move_along", name(body)?);
                 t.put_unless("c2", "smoothness", if path.smoothness() == Smoothness::C1 { "c1" } else { "c2" });
                 let ends = match path.ends() {
                     Ends::Rest => "rest",

@@ -47,6 +47,10 @@ fn wrong_events_are_refused_with_line_and_column() {
             "s.toml:13:7: do 1 has no `impulse_n_s`; expected a list of 3 numbers",
         ),
         (
+            "when = { time_s = 1 }\ndo = [{ push = \"floor\", force_n = [0, 0, 1], duration_s = 1 }]".into(),
+            "s.toml:13:35: `force_n` of do 1 is [0, 0, 1]; expected `impulse_n_s`, or `force = \"BODY\"` instead of `push`",
+        ),
+        (
             "when = { time_s = 1 }\ndo = [{ remove = \"other\" }]".into(),
             "s.toml:13:18: `remove` of do 1 is \"other\"; expected the name of a body: `when` has no other one",
         ),
@@ -55,8 +59,8 @@ fn wrong_events_are_refused_with_line_and_column() {
             "s.toml:13:19: `recolor` of do 1 is \"other\"; expected a trigger that names the bodies",
         ),
         (
-            "when = { time_s = 1 }\ndo = [{ move = \"floor\", keyframes = [] }]".into(),
-            "s.toml:13:16: `move` of do 1 is \"floor\"; expected the name of a body with mode = \"kinematic\"",
+            "when = { time_s = 1 }\ndo = [{ move_along = \"floor\", keyframes = [] }]".into(),
+            "s.toml:13:16: `move_along` of do 1 is \"floor\"; expected the name of a body with mode = \"kinematic\"",
         ),
         (
             "when = { time_s = 1 }\ndo = [{ light = 2, intensity = 1 }]".into(),
@@ -99,7 +103,7 @@ fn the_known_keys_of_events_are_in_the_reference() {
         format!("when = {{ time_s = 1 }}\n{q}"),
         format!("when = {{ time_s = 1 }}\ndo = [{{ spawn = \"ball\", {q} }}]"),
         format!("when = {{ time_s = 1 }}\ndo = [{{ push = \"floor\", impulse_n_s = [0, 0, 1], {q} }}]"),
-        format!("when = {{ time_s = 1 }}\ndo = [{{ push = \"floor\", force_n = [0, 0, 1], duration_s = 1, {q} }}]"),
+        format!("when = {{ time_s = 1 }}\ndo = [{{ force = \"floor\", force_n = [0, 0, 1], duration_s = 1, {q} }}]"),
         format!("when = {{ time_s = 1 }}\ndo = [{{ light = 1, intensity = 1, {q} }}]"),
     ];
     let mut seen = 0;

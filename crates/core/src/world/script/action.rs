@@ -55,7 +55,7 @@ pub enum Action<B = ObjectId> {
         duration: f64,
     },
     /// Sets the velocity of a rigid body, dynamic or kinematic.
-    Velocity {
+    SetVelocity {
         /// The body.
         body: Subject<B>,
         /// Velocity of the center of mass, m/s.
@@ -86,7 +86,7 @@ pub enum Action<B = ObjectId> {
     },
     /// Moves a kinematic rigid body along a path, which begins when the event fires. The latest firing
     /// counts.
-    Move {
+    MoveAlong {
         /// The body.
         body: B,
         /// Poses of the body's frame over the time since the event fired.
@@ -162,15 +162,15 @@ impl<B> Action<B> {
             &Action::Force { ref body, force, torque, duration } => {
                 Action::Force { body: body.map(f), force, torque, duration }
             }
-            &Action::Velocity { ref body, velocity, angular_velocity } => {
-                Action::Velocity { body: body.map(f), velocity, angular_velocity }
+            &Action::SetVelocity { ref body, velocity, angular_velocity } => {
+                Action::SetVelocity { body: body.map(f), velocity, angular_velocity }
             }
             Action::Remove(body) => Action::Remove(body.map(f)),
             Action::Enable(object) => Action::Enable(f(object)),
             Action::Disable(object) => Action::Disable(f(object)),
             Action::Attach { joint, here } => Action::Attach { joint: f(joint), here: *here },
             Action::Recolor { body, color } => Action::Recolor { body: body.map(f), color: *color },
-            Action::Move { body, path } => Action::Move { body: f(body), path: path.clone() },
+            Action::MoveAlong { body, path } => Action::MoveAlong { body: f(body), path: path.clone() },
             &Action::Drive { ref body, dof, target, original } => {
                 Action::Drive { body: f(body), dof, target, original }
             }
@@ -181,7 +181,7 @@ impl<B> Action<B> {
 
     /// Returns whether it follows from the state of its event after the firing.
     pub(super) fn goes_on(&self) -> bool {
-        let lasting = matches!(self, Action::Force { .. } | Action::Move { .. } | Action::Drive { .. });
+        let lasting = matches!(self, Action::Force { .. } | Action::MoveAlong { .. } | Action::Drive { .. });
         lasting || self.is_look() || matches!(self, Action::Attach { here: true, .. })
     }
 
@@ -190,7 +190,7 @@ impl<B> Action<B> {
         match self {
             Action::Push { body, .. }
             | Action::Force { body, .. }
-            | Action::Velocity { body, .. }
+            | Action::SetVelocity { body, .. }
             | Action::Remove(body)
             | Action::Recolor { body, .. } => Some(body),
             _ => None,
@@ -202,7 +202,7 @@ impl<B> Action<B> {
         match self {
             Action::Push { body, .. }
             | Action::Force { body, .. }
-            | Action::Velocity { body, .. }
+            | Action::SetVelocity { body, .. }
             | Action::Remove(body)
             | Action::Recolor { body, .. } => Some(body),
             _ => None,

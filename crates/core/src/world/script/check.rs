@@ -95,7 +95,7 @@ impl ScriptedEvent {
                 finite("a force", force.iter().chain(torque))?;
                 moving(body)
             }
-            Action::Velocity { body, velocity, angular_velocity } => {
+            Action::SetVelocity { body, velocity, angular_velocity } => {
                 finite("a velocity", velocity.iter().chain(angular_velocity))?;
                 moving(body)?;
                 match body {
@@ -119,7 +119,7 @@ impl ScriptedEvent {
                 }
                 moving(body)
             }
-            Action::Move { body, .. } => {
+            Action::MoveAlong { body, .. } => {
                 of_kind::<RigidBody>(world, *body, "a rigid body")?;
                 let kinematic = world.status(*body).is_some_and(|status| status.mode == Mode::Kinematic);
                 if kinematic {

@@ -90,7 +90,7 @@ impl Core {
         let mut movers: Vec<Mover> = Vec::new();
         for (x, event) in self.fired() {
             for action in event.actions().iter() {
-                let Action::Move { body, path } = action else { continue };
+                let Action::MoveAlong { body, path } = action else { continue };
                 let new = Mover { body: *body, path: path.clone(), stamp: x[STAMP], start: x[TIME] };
                 match movers.iter_mut().find(|old| old.body == new.body) {
                     Some(old) if old.stamp <= new.stamp => *old = new,

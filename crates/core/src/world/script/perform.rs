@@ -73,7 +73,7 @@ impl World {
                 };
                 self.apply_impulse(body, part, *impulse, &at)
             }
-            Action::Velocity { body, velocity, angular_velocity } => {
+            Action::SetVelocity { body, velocity, angular_velocity } => {
                 self.set_velocity(who(body)?.0, *velocity, *angular_velocity)
             }
             Action::Remove(body) => self.set_enabled(who(body)?.0, false),
@@ -94,7 +94,7 @@ impl World {
                 Ok(())
             }
             // these follow from the state at the start of each frame, or when the world is drawn
-            Action::Force { .. } | Action::Move { .. } | Action::Drive { .. } => Ok(()),
+            Action::Force { .. } | Action::MoveAlong { .. } | Action::Drive { .. } => Ok(()),
             Action::Camera(_) | Action::Light(_) => Ok(()),
         }
     }

@@ -11,6 +11,7 @@ mod mirror;
 mod pace;
 mod places;
 mod quantize;
+mod queries;
 mod refusals;
 mod reports;
 pub mod simulated_session;

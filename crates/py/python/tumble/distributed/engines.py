@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from typing import Any, TypeAlias
 
 from tumble._errors import InvalidValueError
+from tumble._keywords import hinted
 from tumble.distributed.calls import Outcome, call
 
 STOP_S = 5.0  # the longest wait for an engine that stops
@@ -82,6 +83,7 @@ class _SerialSession(Session):
 EngineLike: TypeAlias = Engine | Executor | Callable[[], Executor] | str | Any | None
 
 
+@hinted
 def connect(engine: EngineLike = None, *, workers: int | None = None) -> Engine:
     """Returns an engine to use for several calls of ``map``; close it, or use it in a ``with`` block.
 

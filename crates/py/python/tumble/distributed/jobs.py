@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from typing import Any, Literal
 
 from tumble._errors import InvalidValueError
+from tumble._keywords import hinted
 from tumble.distributed.calls import JobError, Outcome, error_of
 from tumble.distributed.engines import Engine, EngineLike, Session, connect
 from tumble.distributed.progress import Count, Progress
@@ -18,6 +19,7 @@ from tumble.distributed.store import Store
 from tumble.distributed.store import key as key_of
 
 
+@hinted
 def map(
     function: Callable[[Any], Any],
     jobs: Iterable[Any],
@@ -60,6 +62,7 @@ def map(
     return results
 
 
+@hinted
 def as_completed(
     function: Callable[[Any], Any],
     jobs: Iterable[Any],

@@ -50,7 +50,14 @@ impl World {
     /// set, else those of the combination rules.
     ///
     /// a, b: as in ``set_pair_material``. An articulation is represented by its first shape.
-    fn pair_material(&self, a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> Result<(f64, f64)> {
+    #[pyo3(signature = (a, b, **unknown), text_signature = "($self, a, b)")]
+    fn pair_material(
+        &self,
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<(f64, f64)> {
+        keywords::check(unknown, "World.pair_material")?;
         pairs::get(&self.shared, [a, b])
     }
 
@@ -62,13 +69,17 @@ impl World {
 
     /// Returns the rigid body, or static geometry, of that name. An articulation or an unknown name
     /// raises ``UnknownNameError``.
-    fn body(&self, py: Python<'_>, name: &str) -> Result<RigidBody> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn body(&self, py: Python<'_>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<RigidBody> {
+        keywords::check(unknown, "World.body")?;
         bodies::rigid_body(py, &self.shared, name)
     }
 
     /// Returns the articulated body of that name. A rigid body or an unknown name raises
     /// ``UnknownNameError``.
-    fn articulation(&self, py: Python<'_>, name: &str) -> Result<Articulation> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn articulation(&self, py: Python<'_>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<Articulation> {
+        keywords::check(unknown, "World.articulation")?;
         bodies::articulation(py, &self.shared, name)
     }
 
@@ -85,7 +96,9 @@ impl World {
     }
 
     /// Returns the joint of that name, made by ``add_joint`` or ``[[loop_joint]]``.
-    fn joint(&self, py: Python<'_>, name: &str) -> Result<Joint> {
+    #[pyo3(signature = (name, **unknown), text_signature = "($self, name)")]
+    fn joint(&self, py: Python<'_>, name: &str, unknown: Option<Unknown<'_, '_>>) -> Result<Joint> {
+        keywords::check(unknown, "World.joint")?;
         Joint::new(py, joints::place_by_name(&self.shared, name)?)
     }
 
@@ -106,7 +119,9 @@ impl World {
 
     /// Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
     /// of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
-    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (body, **unknown), text_signature = "($self, body)")]
+    fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "World.remove")?;
         if let Ok(name) = body.extract::<String>()
             && self.shared.extend(py, |inner| inner.remove_extension(&name))?
         {
@@ -131,20 +146,31 @@ impl World {
 
     /// Adds a custom force: an object of a subclass of ``tumble.Force``. Its name must be unique
     /// among bodies, forces and behaviors.
-    fn add_force(&self, py: Python<'_>, name: &str, force: &Bound<'_, PyAny>) -> Result<()> {
+    #[pyo3(signature = (name, force, **unknown), text_signature = "($self, name, force)")]
+    fn add_force(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        force: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<()> {
+        keywords::check(unknown, "World.add_force")?;
         py.import("tumble._extension")?.call_method1("check_force", (force,))?;
         self.shared.extend(py, |inner| inner.add_force(name, force))
     }
 
     /// Adds a custom behavior, an object of a subclass of ``tumble.Behavior``, to bodies given by
     /// name or as handles.
+    #[pyo3(signature = (name, behavior, bodies, **unknown), text_signature = "($self, name, behavior, bodies)")]
     fn add_behavior(
         &self,
         py: Python<'_>,
         name: &str,
         behavior: &Bound<'_, PyAny>,
         bodies: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
+        keywords::check(unknown, "World.add_behavior")?;
         py.import("tumble._extension")?.call_method1("check_behavior", (behavior,))?;
         let given: Vec<Bound<'_, PyAny>> =
             match bodies.is_instance_of::<pyo3::types::PyString>() || place_of(bodies).is_ok() {

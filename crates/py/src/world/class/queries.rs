@@ -36,12 +36,15 @@ impl World {
     ///
     /// a, b: a body, an articulation or a link: a handle, a name, ``"ARTICULATION/LINK"`` or (articulation, link). A link is its own
     /// shapes, without those of links fixed to it.
+    #[pyo3(signature = (a, b, **unknown), text_signature = "($self, a, b)")]
     fn contact_force<'py>(
         &self,
         py: Python<'py>,
         a: &Bound<'py, PyAny>,
         b: &Bound<'py, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Bound<'py, PyArray1<f64>>> {
+        keywords::check(unknown, "World.contact_force")?;
         let ((a, parts_a), (b, parts_b)) = (query::named(&self.shared, a)?, query::named(&self.shared, b)?);
         let force = self
             .shared
@@ -70,12 +73,15 @@ impl World {
     /// Returns the name of a shape, or None if it has none, by the numbers that ``contacts`` and queries report.
     ///
     /// body: number in ``bodies``, a handle or a name; part, shape: the numbers beside it.
+    #[pyo3(signature = (body, part, shape, **unknown), text_signature = "($self, body, part, shape)")]
     fn shape_name(
         &self,
         body: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = whole::part)] part: usize,
         #[pyo3(from_py_with = whole::shape)] shape: usize,
+        unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Option<String>> {
+        keywords::check(unknown, "World.shape_name")?;
         let named = body.is_instance_of::<PyString>() || body.extract::<usize>().is_err();
         let handle = named.then(|| own_place(&self.shared, body)).transpose()?;
         self.shared.read(|inner| {

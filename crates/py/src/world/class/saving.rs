@@ -25,7 +25,14 @@ impl World {
     /// Returns notes about things that are not in it, such as generalized forces and visuals that scenes do
     /// not have. Forces and behaviors written in Python, and all else that a scene cannot say, raise
     /// ``ValueError`` with their names, and nothing is written.
-    fn save_scene(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
+    #[pyo3(signature = (path, **unknown), text_signature = "($self, path)")]
+    fn save_scene(
+        &self,
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Vec<String>> {
+        keywords::check(unknown, "World.save_scene")?;
         let path = self::path(path)?;
         self.shared.work(py, |inner| save_scene::write(inner, &path))
     }
@@ -34,7 +41,14 @@ impl World {
     /// ``NAME_files`` beside it for meshes. The keyframe ``now`` of the model is the present state.
     ///
     /// Returns notes about everything that MJCF cannot say.
-    fn save_mjcf(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> Result<Vec<String>> {
+    #[pyo3(signature = (path, **unknown), text_signature = "($self, path)")]
+    fn save_mjcf(
+        &self,
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        unknown: Option<Unknown<'_, '_>>,
+    ) -> Result<Vec<String>> {
+        keywords::check(unknown, "World.save_mjcf")?;
         let path = self::path(path)?;
         self.shared.work(py, |inner| save_mjcf::write(inner, &path))
     }
@@ -48,7 +62,9 @@ impl World {
 
     /// Restores the bytes of ``save``. Invalid bytes, or those of another world, raise
     /// ``SnapshotError`` and change nothing.
-    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes) -> Result<()> {
+    #[pyo3(signature = (snapshot, **unknown), text_signature = "($self, snapshot)")]
+    fn restore(&self, py: Python<'_>, snapshot: PyBackedBytes, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
+        keywords::check(unknown, "World.restore")?;
         self.shared.write(py, |inner| snapshot::read(inner, &snapshot))
     }
 
