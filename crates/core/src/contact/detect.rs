@@ -263,12 +263,10 @@ impl Detector<'_> {
             let tight = shape.aabb(&part_state.pose);
             let around = (tight.max - part_state.position()).sup(&(part_state.position() - tight.min));
             let motion = MotionBounds::new(part_state, shape.bounding_radius(), around, reach.horizon);
-            Some(PartBounds {
-                key: [entry.serial, part],
-                motion,
-                swept: motion.swept(&tight, settings.drift_tolerance + 0.5 * reach.distance),
-                moving: entry.status.mode != Mode::Static && !entry.asleep,
-            })
+            let moving = entry.status.mode != Mode::Static && !entry.asleep;
+            // bounds of settled parts stay, so they must not depend on the reach
+            let near = settings.drift_tolerance + if moving { reach.distance } else { 0.0 };
+            Some(PartBounds { key: [entry.serial, part], motion, swept: motion.swept(&tight, near), moving })
         };
         let bounds = &mut self.scratch.part_bounds;
         let walk = &objects.table.walk;

@@ -148,7 +148,9 @@ fn solve_coupled(
     (keep, first_row): (&[bool], usize),
 ) -> bool {
     let all_kept = patches.iter().all(|patch| patch.contacts.clone().all(|i| keep[i]));
-    if !core.solver.follows_forces() || settings.budget.is_some() || !all_kept {
+    // the others are solved once, so friction that depends on the speed must not be among them
+    let all_rows = patches.iter().all(|patch| patch.torsional.is_some() || patch.rolling.is_some());
+    if !core.solver.follows_forces() || settings.budget.is_some() || !all_kept || !all_rows {
         return false;
     }
     work.islands.build(&work.rows, |b| keep.get(b).copied().unwrap_or(true));

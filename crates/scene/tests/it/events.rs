@@ -60,7 +60,7 @@ fn wrong_events_are_refused_with_line_and_column() {
         ),
         (
             "when = { time_s = 1 }\ndo = [{ move_along = \"floor\", keyframes = [] }]".into(),
-            "s.toml:13:16: `move_along` of do 1 is \"floor\"; expected the name of a body with mode = \"kinematic\"",
+            "s.toml:13:22: `move_along` of do 1 is \"floor\"; expected the name of a body with mode = \"kinematic\"",
         ),
         (
             "when = { time_s = 1 }\ndo = [{ light = 2, intensity = 1 }]".into(),

@@ -97,11 +97,14 @@ fn the_wave_of_dominoes_keeps_its_speed_to_the_last() {
 }
 
 /// Thirty dominoes in a straight row, `scale` times as long, wide and high as those of the scene,
-/// the first one let go at an angle, with a step that is longer by the root of the scale.
+/// the first one let go at an angle, with tolerances that are as much larger and a step that is longer by the root of the
+/// scale.
 fn row(scale: f64) -> SceneFile {
     let mut text = format!(
-        "[world]\ndt_s = {}\n[[body]]\nname = \"table\"\nmode = \"static\"\nshape = {{ type = \"half_space\" }}\n",
-        scale.sqrt() / 480.0
+        "[world]\ndt_s = {}\ncontact_tolerance_m = {}\ndrift_tolerance_m = {}\n[[body]]\nname = \"table\"\nmode = \"static\"\nshape = {{ type = \"half_space\" }}\n",
+        scale.sqrt() / 480.0,
+        1e-7 * scale,
+        1e-4 * scale
     );
     let [t, w, h] = [0.0075, 0.024, 0.048].map(|size| scale * size);
     // the first falls about its lower edge, from 10 degrees and at 3 rad/s

@@ -59,8 +59,9 @@ const FACTORS: (u32, u32, u32) = (8, 30, 8);
 const LAGGED: (u32, u32) = (150, 20);
 /// Penalties of the forces with which all contacts stick, in the order in which they are tried.
 const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
-/// Error, relative to the fastest row, of an island in motion below which little is left to gain.
-const NEARLY: f64 = 1e-7;
+/// Error, relative to the fastest row, of an island in motion of more than this number of degrees of freedom below which little
+/// is left to gain.
+const NEARLY: (f64, usize) = (1e-7, 36);
 /// Maximum number of factorizations with a lagged shift of such an island.
 const LAST_DIGITS: u32 = 110;
 /// Degrees of freedom of a small island, on which no effort is spared.
@@ -163,7 +164,7 @@ impl<'a> Plan<'a> {
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
         }
-        let nearly = !self.at_rest && error <= NEARLY * fastest;
+        let nearly = !self.at_rest && system.island.dof > NEARLY.1 && error <= NEARLY.0 * fastest;
         if error > tolerance.solved && error.is_finite() && cheap {
             let limit = if small { LAGGED.0 } else { LAGGED.1 };
             let limit = if nearly { limit.min(LAST_DIGITS) } else { limit };

@@ -56,7 +56,7 @@ impl Approach {
 fn may_strike(core: &Core, constraint: &ContactConstraint) -> bool {
     let entry = |part: u32| core.objects().at(core.owners[part as usize].place as usize);
     let of_link = || [constraint.a, constraint.b].iter().any(|part| in_the_middle(&entry(*part)));
-    constraint.restitution > 0.0 || constraint.gap_of_row() > core.settings.contact_tolerance && !of_link()
+    constraint.restitution > 0.0 || constraint.gap_of_row() > 0.0 && !of_link()
 }
 
 /// Returns whether an open contact without restitution, which approaches at `speed` when it closes, stops at that time.
@@ -115,7 +115,8 @@ impl TimeStepping {
             let time = time_to_close(gap / h, v, gain).filter(|s| *s <= 1.0 && may_strike(core, constraint));
             let impact_fraction = time.filter(|s| {
                 let speed = -(v + s * gain);
-                speed > rest_speed && (constraint.restitution > 0.0 || stops(core, constraint, (v, gain), speed))
+                let bounces = constraint.restitution > 0.0;
+                if bounces { speed > rest_speed } else { speed > pressed && stops(core, constraint, (v, gain), speed) }
             });
             impact_fractions.push(impact_fraction);
             rates.push(rate);

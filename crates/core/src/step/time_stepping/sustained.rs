@@ -15,10 +15,13 @@ use crate::solver::SolverSettings;
 use crate::step::contacts::{solve, zero};
 use crate::world::Core;
 
+/// Largest residual of a frame, m/s, with which the difference of two solves means something.
+const MEANINGFUL: f64 = 1e-6;
+
 impl TimeStepping {
     /// Writes the change of whitened velocity by what holds bodies after an impact to `buffers.sustained`, after the
     /// solve of the step. `du_force` is the change by forces. A step with a budget has one solve, and a frame in which a
-    /// solve did not converge takes no further one, whose difference would mean little: then all is zero.
+    /// solve ended far from its solution takes no further one, whose difference would mean little: then all is zero.
     pub(super) fn find_sustained(&mut self, core: &mut Core, settings: SolverSettings, du_force: &[f64]) {
         let (work, fraction) = (&mut self.work, &self.impact_fraction);
         let Buffers { keep, sustained, .. } = &mut self.buffers;
@@ -31,7 +34,7 @@ impl TimeStepping {
             .map(|(block, keep)| *keep && block.sides().iter().any(|side| fraction[side.u as usize] >= 0.0))
             .collect();
         let holds = |(block, struck): (&Block, &bool)| *struck && work.lambda[block.row as usize] != 0.0;
-        let single = settings.budget.is_some() || core.report.unconverged > 0;
+        let single = settings.budget.is_some() || core.report.residual > MEANINGFUL;
         if single || !work.rows.blocks.iter().zip(&struck).any(holds) {
             return;
         }
