@@ -48,26 +48,26 @@ macro_rules! table {
 
 table! {
     [1.0, 10.0];
-    billiards_time_stepping: "billiards", TimeStepping, "8f01ac981dbda08f", "35727a0afefe7dab";
-    billiards_backtracking: "billiards", Backtracking, "33f9123d30fcbc15", "84b5733c3c00771e";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "930c5c5acab66f4a";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "4aaba541f979a1b7";
-    chain_time_stepping: "chain", TimeStepping, "a88220838a0cc2eb", "50bf194f3b66f688";
-    chain_backtracking: "chain", Backtracking, "75c284a6039e4577", "3f461f8d7cf9212e";
-    falling_time_stepping: "falling", TimeStepping, "445334e847d6ff0e", "ac07159eaec076fc";
+    billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
+    billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "9637b6c214a4c1e3";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "177b70cbfeccbaf8";
+    chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
+    chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";
+    falling_time_stepping: "falling", TimeStepping, "7eb30b32d218834a", "e363e4d1a6fe4592";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "cafae29e45444c7b", "855b1f5f3db52def";
+    falling_backtracking: "falling", Backtracking, "3323082113bc7cde", "448f28ff37ec1eba";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
-    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "f3d2566244a33458";
-    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c82ac5e456d8f016";
-    skeleton_time_stepping: "skeleton", TimeStepping, "2c778fda0f9c5a03", "5ebca02f30ba702e";
-    skeleton_backtracking: "skeleton", Backtracking, "ca2fb3da08c0a460", "09b1ab65352375a7";
+    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "26a81f44419e1e20";
+    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "358d4f517d998f37";
+    skeleton_time_stepping: "skeleton", TimeStepping, "e2f709491ea28dc6", "8d8e954161ebda48";
+    skeleton_backtracking: "skeleton", Backtracking, "a5c9e7e222e6da4f", "89778efcec5ee314";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -75,8 +75,8 @@ table! {
 // Structures and machines whose steps cost more, or that are known after less.
 table! {
     [0.5, 2.0];
-    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "31502da018d5f877";
-    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "4b6806a3ed046400";
+    ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "6ca07cc8c4dab840";
+    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "e1fbe6c431a91a54";
     bird_time_stepping: "bird", TimeStepping, "3d85f0ea42bb77db", "878264a194147426";
     bird_backtracking: "bird", Backtracking, "1ce1e6f8cf5eb25d", "dcde02ee42013d37";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
@@ -91,21 +91,21 @@ table! {
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
-    arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "da88b3337864b3ba";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "3d1c6e780840feba";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "71898652f200ca3e", "e5d1e0756ac695ee";
-    mechanism_time_stepping: "mechanism", TimeStepping, "439037c3fa7400c0", "f0b75853a7699303";
-    dominoes_time_stepping: "dominoes", TimeStepping, "fc37f235c8a49790", "737df8775c8f83fd";
+    arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "17736b4a409409d7";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "f161c71791aeebb2";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "ec2537fe82992bd7";
+    mechanism_time_stepping: "mechanism", TimeStepping, "5b4d12d63f4d7f7e", "7185e7c6f3855768";
+    dominoes_time_stepping: "dominoes", TimeStepping, "0a55b44d11b908de", "3e1767c88f56b8cc";
 }
 
 table! {
     [0.1, 0.3];
-    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "ab6b9d5a1a151cad";
-    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "14f546925b6b5f95";
-    jelly_time_stepping: "jelly", TimeStepping, "1395fdace9fb6d7c", "0a30a4ebc5783f12";
+    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "dde505f9a4346cd5";
+    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "a29199d1e97be98d";
+    jelly_time_stepping: "jelly", TimeStepping, "fb98edf8419e0514", "1a7816c1e1d6a3a6";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
-    mechanism_backtracking: "mechanism", Backtracking, "45f0dd6e992ac31c", "1890656b20974f80";
-    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "6ee8cd1aa8618179", "c32e6609d8484d51";
+    mechanism_backtracking: "mechanism", Backtracking, "606256fe05e92405", "199a060ec701269e";
+    wrecking_ball_backtracking: "wrecking_ball", Backtracking, "be3e16a61a93cd6a", "9121e031bf023833";
 }

@@ -157,7 +157,7 @@ impl TimeStepping {
     }
 
     /// Returns whether the last correction has left no overlap beyond the tolerance, by its rows: if bodies have moved so little
-    /// that the contacts within `reach`, m, are all that matter, and turned so little that their rows tell their gaps.
+    /// that the contacts within `reach`, m, are all that matter, and turned so little that their rows give their gaps.
     fn is_separated(&self, core: &Core, reach: f64) -> bool {
         let (end, half) = (&self.end, 0.5 * core.settings.drift_tolerance);
         let is_rigid = |block: &Block| block.sides().iter().all(|side| side.dof == 6);
