@@ -12,6 +12,7 @@ use tumble_net::sync::{Mirror, Publisher};
 use tumble_net::world::{contacts, entities, events, poses, readings};
 
 /// Balls are spawned, one at a time takes another color at its first contact, a light fades and the camera turns.
+/// A ball each tenth of a second, too fast for the next one to meet it.
 fn scripted() -> World {
     let mut world = World::default();
     let floor = world.add(RigidBody::fixed(Shape::half_space())).unwrap();
@@ -19,7 +20,7 @@ fn scripted() -> World {
     let store = Template::add(&mut world, "ball", &ball, 4, true).unwrap();
     let balls = world.get::<Template>(store).unwrap().bodies().to_vec();
     let drop = ScriptedEvent::new("drop", Trigger::Every { period: 0.1, first: 0.05 });
-    world.add(drop.with_action(Action::spawn(store, Pose::translation(0.0, 0.0, 0.3), Vec3::x()))).unwrap();
+    world.add(drop.with_action(Action::spawn(store, Pose::translation(0.0, 0.0, 0.3), 3.0 * Vec3::x()))).unwrap();
     let hit = ScriptedEvent::new("hit", Trigger::Contact { a: vec![floor], b: balls, impulse: 0.0 });
     world.add(hit.with_action(Action::Recolor { body: Subject::Other, color: [1.0, 0.0, 0.0] })).unwrap();
     let light = LightChange { light: 0, intensity: Some(0.3), color: None };
