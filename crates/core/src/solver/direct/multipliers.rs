@@ -109,7 +109,8 @@ impl Multipliers {
                     return taken;
                 }
                 let size = dot(&self.slope, &self.slope).sqrt();
-                if !(most * size > enough) {
+                let largest = most * size;
+                if largest.is_nan() || largest <= enough {
                     break;
                 }
                 self.take_step(island, epsilon);
