@@ -12,8 +12,10 @@ use std::time::Duration;
 
 /// How long a call steps before it checks for Ctrl-C.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// The same with the interpreter held: the interpreter's own switch interval between threads.
-const TURN: Duration = Duration::from_millis(5);
+/// The same with the interpreter held, in switch intervals of the interpreter. A thread that waits
+/// for the interpreter asks for its turn only after one whole interval without a release, so turns
+/// of one interval could starve it.
+const INTERVALS: f64 = 2.0;
 
 /// A world behind its lock, and the thread that works on it.
 pub struct Shared {
@@ -98,7 +100,7 @@ impl Shared {
         let mut held = self.hold()?;
         apart(py, &mut held, |py, inner| {
             loop {
-                let turn = if inner.looked_into(py) { TURN } else { PATIENCE };
+                let turn = if inner.looked_into(py) { turn(py)? } else { PATIENCE };
                 if leave(py, inner, |inner| part(inner, turn))? {
                     return Ok(());
                 }
@@ -133,6 +135,12 @@ fn apart<T>(py: Python<'_>, inner: &mut Inner, call: impl FnOnce(Python<'_>, &mu
     let outcome = call(py, inner);
     inner.world.state_memory().thaw();
     outcome
+}
+
+/// Returns how long a call may hold the interpreter while other threads wait for it.
+fn turn(py: Python<'_>) -> Result<Duration> {
+    let interval: f64 = py.import("sys")?.call_method0("getswitchinterval")?.extract()?;
+    Ok(Duration::try_from_secs_f64(INTERVALS * interval).unwrap_or(PATIENCE))
 }
 
 /// Releases the interpreter for a call, unless an array refers to the memory that changes.
