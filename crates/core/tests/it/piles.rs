@@ -1,7 +1,7 @@
 //! Towers and walls at rest: every solve converges and nothing moves.
 
 use crate::common::{cube, ground, position, world};
-use tumble_collide::{Pose, Shape, Vec3};
+use tumble_collide::{Pose, Quat, Shape, Vec3};
 use tumble_core::{Material, ObjectId, RigidBody, World};
 
 /// Steps for `seconds`. Asserts that every solve converges; returns the largest displacement of any
@@ -86,4 +86,61 @@ fn boxes_that_fall_into_a_bin_come_to_rest() {
         assert!(world.report().max_penetration < 1e-6, "{:?}", world.report());
     }
     assert!(moved(&mut world, &bodies, 1.0) < 1e-6);
+}
+
+/// A house of cards of 0.4 × 0.25 m × 2 mm: pairs that lean on each other by 25° under level cards, `storeys` high.
+fn house_of_cards(storeys: usize) -> (World, Vec<ObjectId>) {
+    let (half, thin, depth, lean) = (0.2, 0.001, 0.25, 25_f64.to_radians());
+    let (s, c) = lean.sin_cos();
+    // distances from the middle of a card to its ends, sideways and in height
+    let (aside, high) = (half * s + thin * c, half * c + thin * s);
+    let spacing = 4.0 * aside + 0.002;
+    let mut world = world("time_stepping", 1.0 / 60.0);
+    let material = Material { friction: 0.7, ..Material::default() };
+    world.add(RigidBody::fixed(Shape::half_space()).with_material(material)).unwrap();
+    let mut bodies = Vec::new();
+    let mut card = |size: Vec3, at: Vec3, turn: f64| {
+        let pose = Pose::from_parts(at.into(), Quat::from_axis_angle(&Vec3::y_axis(), turn));
+        let body = RigidBody::new(Shape::cuboid(size).unwrap()).with_material(material);
+        bodies.push(world.add(body.with_pose(pose)).unwrap());
+    };
+    for storey in 0..storeys {
+        let pairs = storeys - storey;
+        let floor = storey as f64 * (2.0 * high + 2.0 * thin);
+        let top = |i: usize| (i as f64 - 0.5 * (pairs - 1) as f64) * spacing;
+        for (i, side) in (0..pairs).flat_map(|i| [(i, -1.0), (i, 1.0)]) {
+            let at = Vec3::new(top(i) + side * aside, 0.0, floor + high);
+            card(Vec3::new(2.0 * thin, depth, 2.0 * half), at, -side * lean);
+        }
+        for i in 1..pairs {
+            let at = Vec3::new(0.5 * (top(i - 1) + top(i)), 0.0, floor + 2.0 * high + thin);
+            card(Vec3::new(spacing - 0.0005, depth, 2.0 * thin), at, 0.0);
+        }
+    }
+    (world, bodies)
+}
+
+/// Houses of cards of three, four and five storeys for two seconds.
+#[test]
+fn houses_of_cards_stand_still() {
+    for storeys in [3, 4, 5] {
+        let (mut world, bodies) = house_of_cards(storeys);
+        let moved = moved(&mut world, &bodies, 2.0);
+        assert!(moved < 1e-6, "{storeys} storeys: {moved} m");
+    }
+}
+
+/// Walls of cubes that touch each other on all sides, 465 of them for a second; with `TUMBLE_SLOW` 5050 of them.
+#[test]
+fn walls_of_cubes_that_touch_stand_still_full_length() {
+    let slow = std::env::var_os("TUMBLE_SLOW").is_some_and(|v| v == "1");
+    for base in [30, 100].into_iter().take(if slow { 2 } else { 1 }) {
+        let mut world = world("time_stepping", 1.0 / 60.0);
+        ground(&mut world, 0.0, 0.5);
+        let rows = (0..base).flat_map(|row| (0..base - row).map(move |i| (row, i, base - row)));
+        let at = |(row, i, count): (i32, i32, i32)| [i as f64 - 0.5 * (count - 1) as f64, 0.0, row as f64 + 0.5];
+        let bodies: Vec<_> = rows.map(|of| add(&mut world, cube(1.0), at(of))).collect();
+        let moved = moved(&mut world, &bodies, 1.0);
+        assert!(moved < 1e-6, "{base} in the lowest row: {moved} m");
+    }
 }

@@ -89,12 +89,39 @@ fn epsilon_of(b: &LocalBlock) -> f64 {
 pub(super) fn solve(
     system: &mut System,
     lambda: &mut [f64],
+    tolerances: (f64, f64),
+    cheap: bool,
+    most: u32,
+) -> (f64, u32) {
+    run(system, lambda, None, tolerances, cheap, most)
+}
+
+/// Number of factorizations of the convex problem.
+const CONVEX: u32 = 25;
+
+/// As [`solve`], of the convex problem in which the shift of each block is held: `shift` has the sliding speeds, m/s. From
+/// any start it ends in the one solution `u` that there is. The error is that of Coulomb's law all the same.
+pub(super) fn solve_convex(
+    system: &mut System,
+    lambda: &mut [f64],
+    shift: &[f64],
+    tolerance: f64,
+    most: u32,
+) -> (f64, u32) {
+    run(system, lambda, Some(shift), (tolerance, 0.0), true, most.min(CONVEX))
+}
+
+fn run(
+    system: &mut System,
+    lambda: &mut [f64],
+    shift: Option<&[f64]>,
     (tolerance, enough): (f64, f64),
     cheap: bool,
     most: u32,
 ) -> (f64, u32) {
     let (mut best, mut taken, mut history) = (f64::INFINITY, 0, Vec::new());
     let mut state = Interior::new(&system.island);
+    state.shift = shift.map(<[f64]>::to_vec);
     loop {
         let error = state.linearize(&system.island);
         let (span, progress) = PROGRESS[usize::from(!cheap)];
@@ -127,6 +154,8 @@ struct Interior {
     gains: Vec<M3>,
     /// `r_u`.
     rest: Vec<f64>,
+    /// Sliding speeds of the shifts, if they are held.
+    shift: Option<Vec<f64>>,
     /// Mean of `l·z`.
     mean: f64,
     /// Number of complementarity conditions.
@@ -179,6 +208,7 @@ impl Interior {
             linear: vec![Linear::default(); island.blocks.len()],
             gains: vec![[[0.0; 3]; 3]; island.blocks.len()],
             rest: Vec::new(),
+            shift: None,
             mean: 0.0,
             conditions: live().map(conditions).sum::<f64>().max(1.0),
             work: Vec::new(),
@@ -203,7 +233,8 @@ impl Interior {
         for (i, b) in island.blocks.iter().enumerate() {
             let w = island.row_velocity(b, &self.u, &self.lambda);
             sum += complementarity(b, &self.points[i]);
-            self.linear[i] = Linear::new(b, &self.points[i], w, still);
+            let held = self.shift.as_ref().map(|shift| shift[i]);
+            self.linear[i] = Linear::new(b, &self.points[i], (w, held), still);
             self.gains[i] = self.linear[i].gain;
         }
         self.mean = sum / self.conditions;
@@ -302,7 +333,7 @@ fn bounds(b: &LocalBlock, p: &Point) -> impl Iterator<Item = (usize, f64, f64, f
 }
 
 impl Linear {
-    fn new(b: &LocalBlock, p: &Point, w: V3, still: f64) -> Linear {
+    fn new(b: &LocalBlock, p: &Point, (w, held): (V3, Option<f64>), still: f64) -> Linear {
         let mut linear = Linear { epsilon: epsilon_of(b), ..Linear::default() };
         let epsilon = linear.epsilon;
         match b.kind {
@@ -323,8 +354,11 @@ impl Linear {
             Kind::Cone { mu } => {
                 let speed = length(w[1], w[2]);
                 let soft = length(speed, still).max(f64::MIN_POSITIVE);
-                linear.slide = [w[1] / soft, w[2] / soft];
-                linear.rest = [p.z[0] - (w[0] / mu + speed), p.z[1] - w[1], p.z[2] - w[2]];
+                if held.is_none() {
+                    linear.slide = [w[1] / soft, w[2] / soft];
+                }
+                let shift = held.unwrap_or(speed);
+                linear.rest = [p.z[0] - (w[0] / mu + shift), p.z[1] - w[1], p.z[2] - w[2]];
                 linear.scaling = Scaling::new(p.l, p.z);
                 linear.response = linear.scaling.regular_inverse(epsilon);
                 let g = &linear.response;

@@ -9,8 +9,9 @@
 //! 1. from multipliers that are near, a few steps of semismooth Newton with a proximal term (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
-//! 4. if that is not enough, the method of multipliers with a lagged shift (`lagged.rs`);
-//! 5. of a small island that is still not solved, semismooth Newton from the forces with which all
+//! 4. if that is not enough, the interior point method with a held shift, of an island at rest or a small one (`convex.rs`);
+//! 5. then the method of multipliers with a lagged shift (`lagged.rs`);
+//! 6. of a small island that is still not solved, semismooth Newton from the forces with which all
 //!    contacts stick.
 //!
 //! All of them factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
@@ -20,6 +21,7 @@
 
 mod choice;
 mod cone;
+mod convex;
 mod dense;
 mod interior_point;
 mod island;
@@ -97,7 +99,8 @@ pub(super) struct Direct {
 /// A direct solve of an island that is not too large for it.
 pub(super) struct Plan<'a> {
     system: System<'a>,
-    at_rest: bool,
+    /// Share of the contacts that slide.
+    sliding: f64,
 }
 
 impl<'a> Plan<'a> {
@@ -122,7 +125,7 @@ impl<'a> Plan<'a> {
         let (assembly, sweep) = work_of_blocks(&island);
         let structure = Structure::new(&dof, &island.couplings(), max_work.min(max_cost * sweep - assembly))?;
         let factor = Factor::new(&structure);
-        Some(Plan { system: System { island, structure, factor }, at_rest })
+        Some(Plan { system: System { island, structure, factor }, sliding })
     }
 
     /// Returns the cost of a factorization in sweeps.
@@ -135,8 +138,9 @@ impl<'a> Plan<'a> {
     /// `most` factorizations.
     pub fn solve(mut self, lambda: &mut [f64], tolerance: f64, most: u32) -> Direct {
         let fastest = self.system.island.fastest;
+        let at_rest = self.sliding <= SLIDING.0;
         let cheap = self.system.island.dof <= SMALL || self.cost() < CHEAP;
-        let near = if self.at_rest { NEAR.0 } else { NEAR.1 };
+        let near = if at_rest { NEAR.0 } else { NEAR.1 };
         let tolerance = self.system.island.tolerance(tolerance);
         let system = &mut self.system;
         let small = system.island.dof <= SMALL;
@@ -147,7 +151,7 @@ impl<'a> Plan<'a> {
             return Direct { factorizations: 0, converged: true };
         }
         let (mut error, mut taken) = (start, 0);
-        if error > tolerance.goal && error.is_finite() && (self.at_rest && cheap || error <= near * fastest) {
+        if error > tolerance.goal && error.is_finite() && (at_rest && cheap || error <= near * fastest) {
             (error, taken) = proximal::solve(system, &mut own, error, tolerance, (FACTORS.0.min(most), cheap));
         }
         if error.is_nan() || error > tolerance.solved {
@@ -164,7 +168,11 @@ impl<'a> Plan<'a> {
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
         }
-        let nearly = !self.at_rest && system.island.dof > NEARLY.1 && error <= NEARLY.0 * fastest;
+        if error > tolerance.solved && (self.sliding == 0.0 || at_rest && cheap || small) {
+            let (reached, factors) = convex::solve(system, &mut own, error, tolerance, (most - taken, cheap));
+            (error, taken) = (reached, taken + factors);
+        }
+        let nearly = !at_rest && system.island.dof > NEARLY.1 && error <= NEARLY.0 * fastest;
         if error > tolerance.solved && error.is_finite() && cheap {
             let limit = if small { LAGGED.0 } else { LAGGED.1 };
             let limit = if nearly { limit.min(LAST_DIGITS) } else { limit };
