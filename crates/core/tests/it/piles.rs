@@ -2,7 +2,7 @@
 
 use crate::common::{cube, ground, position, world};
 use tumble_collide::{Pose, Quat, Shape, Vec3};
-use tumble_core::{Material, ObjectId, RigidBody, World};
+use tumble_core::{Material, ObjectId, RigidBody, STEPPERS, World};
 
 /// Steps for `seconds`. Asserts that every solve converges; returns the largest displacement of any
 /// body, m.
@@ -89,13 +89,13 @@ fn boxes_that_fall_into_a_bin_come_to_rest() {
 }
 
 /// A house of cards of 0.4 × 0.25 m × 2 mm: pairs that lean on each other by 25° under level cards, `storeys` high.
-fn house_of_cards(storeys: usize) -> (World, Vec<ObjectId>) {
+fn house_of_cards(stepper: &str, storeys: usize) -> (World, Vec<ObjectId>) {
     let (half, thin, depth, lean) = (0.2, 0.001, 0.25, 25_f64.to_radians());
     let (s, c) = lean.sin_cos();
     // distances from the middle of a card to its ends, sideways and in height
     let (aside, high) = (half * s + thin * c, half * c + thin * s);
     let spacing = 4.0 * aside + 0.002;
-    let mut world = world("time_stepping", 1.0 / 60.0);
+    let mut world = world(stepper, 1.0 / 60.0);
     let material = Material { friction: 0.7, ..Material::default() };
     world.add(RigidBody::fixed(Shape::half_space()).with_material(material)).unwrap();
     let mut bodies = Vec::new();
@@ -123,10 +123,10 @@ fn house_of_cards(storeys: usize) -> (World, Vec<ObjectId>) {
 /// Houses of cards of three, four and five storeys for two seconds.
 #[test]
 fn houses_of_cards_stand_still() {
-    for storeys in [3, 4, 5] {
-        let (mut world, bodies) = house_of_cards(storeys);
+    for (stepper, storeys) in STEPPERS.into_iter().flat_map(|stepper| [3, 4, 5].map(|storeys| (stepper, storeys))) {
+        let (mut world, bodies) = house_of_cards(stepper, storeys);
         let moved = moved(&mut world, &bodies, 2.0);
-        assert!(moved < 1e-6, "{storeys} storeys: {moved} m");
+        assert!(moved < 1e-6, "{stepper}, {storeys} storeys: {moved} m");
     }
 }
 

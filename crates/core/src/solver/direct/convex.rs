@@ -1,5 +1,4 @@
-//! Interior point method with a held shift: for structures that stand by friction, and islands on which the methods with
-//! the shift in motion go nowhere.
+//! Interior point method with a held shift: for structures that stand by friction.
 //!
 //! ```text
 //! s_0 = 0;   u_k, λ_k:  w = c + Yᵀu,  u = Yλ,  cone ∋ λ ⟂ w + s_k·n ∈ dual cone;   s_{k+1} = μ·|w_t(u_k)|
@@ -8,14 +7,15 @@
 //! With De Saxcé's shift `s` held the problem is convex, and the interior point method solves it from any start. If nothing
 //! slides in the solution, as in a house of cards, its shift is 0, so the first pass has solved Coulomb's law too: a solution
 //! without sliding is a solution of the convex problem with `s = 0`, and that has only one `u`. Else the shift follows, as in
-//! Cadoux's iteration (Acary and Brogliato, ch. 13). Semismooth Newton finishes each pass (`proximal.rs`).
+//! Cadoux's iteration (Acary and Brogliato, ch. 13). Semismooth Newton finishes each pass (`proximal.rs`). Of islands in
+//! motion it solves few: from `s = 0` the shift gets near only by half in each pass.
 
 use super::cone::length;
 use super::island::{Island, Kind};
 use super::{FACTORS, System, Tolerance, interior_point, proximal};
 
 /// Maximum number of passes where factorizations are cheap; else there is one.
-const PASSES: u32 = 6;
+const PASSES: u32 = 3;
 
 /// Improves `lambda`, whose error is `error`, with at most `factors` factorizations. Returns the error of the best
 /// multipliers found, which it leaves in `lambda`, and the number of factorizations.

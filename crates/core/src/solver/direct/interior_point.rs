@@ -29,6 +29,8 @@
 //! z_lo − z_hi`. An equality takes `δλ = −(w + Yᵀδu)/(R + ε)`; the small `ε` keeps redundant rows
 //! regular and its error goes with the iterations.
 //!
+//! With the shift held (`convex.rs`) `D = T`, and what is solved is convex.
+//!
 //! Multipliers of redundant contacts end in the middle of what is possible, so four equal corners of
 //! a box carry equal loads. Source of the shift within the iteration: Acary, Brémond and Huber, *On
 //! solving contact problems with Coulomb friction*, 2018; of the scaling: `cone.rs`.
@@ -39,6 +41,8 @@ use super::island::{Island, Kind, LocalBlock};
 
 /// Maximum number of iterations, and the number after which [`super::ENOUGH`] is enough.
 const ITERATIONS: (u32, u32) = (40, 15);
+/// Maximum number of iterations of the convex problem.
+const CONVEX: u32 = 25;
 /// Number of iterations that must lower the error, or the mean of `l·z`, and by which factor: of cheap
 /// factorizations, and of expensive ones, where the method converges fast or not at all.
 const PROGRESS: [(usize, f64); 2] = [(5, 0.8), (2, 0.03)];
@@ -96,9 +100,6 @@ pub(super) fn solve(
     run(system, lambda, None, tolerances, cheap, most)
 }
 
-/// Number of factorizations of the convex problem.
-const CONVEX: u32 = 25;
-
 /// As [`solve`], of the convex problem in which the shift of each block is held: `shift` has the sliding speeds, m/s. From
 /// any start it ends in the one solution `u` that there is. The error is that of Coulomb's law all the same.
 pub(super) fn solve_convex(
@@ -111,6 +112,7 @@ pub(super) fn solve_convex(
     run(system, lambda, Some(shift), (tolerance, 0.0), true, most.min(CONVEX))
 }
 
+/// Iterates from the middle of the cones, with the shift held or in motion.
 fn run(
     system: &mut System,
     lambda: &mut [f64],

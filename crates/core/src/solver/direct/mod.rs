@@ -9,7 +9,7 @@
 //! 1. from multipliers that are near, a few steps of semismooth Newton with a proximal term (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
-//! 4. if that is not enough, the interior point method with a held shift, of an island at rest or a small one (`convex.rs`);
+//! 4. if that is not enough, the interior point method with a held shift, of an island at rest (`convex.rs`);
 //! 5. then the method of multipliers with a lagged shift (`lagged.rs`);
 //! 6. of a small island that is still not solved, semismooth Newton from the forces with which all
 //!    contacts stick.
@@ -168,7 +168,7 @@ impl<'a> Plan<'a> {
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
         }
-        if error > tolerance.solved && (self.sliding == 0.0 || at_rest && cheap || small) {
+        if error > tolerance.solved && (self.sliding == 0.0 || at_rest && cheap && !small) {
             let (reached, factors) = convex::solve(system, &mut own, error, tolerance, (most - taken, cheap));
             (error, taken) = (reached, taken + factors);
         }
