@@ -44,6 +44,7 @@ NOT_RUN = {
     "tumble check measured/cave.toml": "a camera: crates/tumble/tests/it/calibrate.rs",
     "tumble cave billiards --cave wall3 --web …": "browsers: crates/tumble/tests/it/cave_web.rs",
     "tumble cave billiards --cave cube4 --vrpn …": "a tracker: crates/tumble/src/cave/tracker/vrpn_client.rs",
+    "tumble cave billiards --cave cube4 --openxr viewer": "a headset: crates/tumble/tests/it/cave_openxr.rs",
     "tumble console 127.0.0.1:47300 …": "a run beside it: crates/tumble/tests/it/cave_console.rs",
     "rustup target add …": "installs what crates/tumble/tests/it/page.rs needs, where a page can be made",
     "scripts/page.sh": "builds for another target: crates/tumble/tests/it/page.rs",

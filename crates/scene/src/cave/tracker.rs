@@ -52,6 +52,9 @@ pub struct Tracker {
     /// Bodies of DTrack with the parts that they move: datagrams are its output instead of OSC. Default:
     /// none.
     pub dtrack_map: Vec<DeviceMap>,
+    /// User, by its name at the tracker, whose head and hands are those of a headset of this machine by
+    /// OpenXR, instead of datagrams; the axes are then `y_up`. Default: none.
+    pub openxr: Option<String>,
 }
 
 impl Tracker {
@@ -68,6 +71,7 @@ impl Tracker {
             vrpn: None,
             vrpn_map: Vec::new(),
             dtrack_map: Vec::new(),
+            openxr: None,
         }
     }
 
@@ -89,16 +93,19 @@ impl Tracker {
         let vrpn = read_vrpn(&mut f);
         let vrpn_map = read_vrpn_map(&mut f, &users, vrpn.is_some());
         let dtrack_map = read_dtrack_map(&mut f, &users, vrpn.is_some());
+        let openxr = read_openxr(&mut f, &users, vrpn.is_some(), !dtrack_map.is_empty());
+        let axes = if openxr.is_some() { Axes::YUp } else { default.axes };
         let tracker = Tracker {
             vrpn,
             vrpn_map,
             dtrack_map,
+            openxr,
             address,
             port: f.integer_or("port", 1..=65535, port) as u16,
             users,
             senders: read_senders(&mut f),
             sealed: f.flag_or("sealed", default.sealed),
-            axes: f.choice_or("axes", AXES, default.axes),
+            axes: f.choice_or("axes", AXES, axes),
             origin_m: f.vector_or("origin_m", crate::parse::bound::Bound::ANY, default.origin_m),
         };
         if f.log.count() == problems && !tracker.address.is_loopback() && tracker.senders.is_empty() && !tracker.sealed
@@ -109,6 +116,10 @@ impl Tracker {
         if f.log.count() == problems && tracker.sealed && !has_key {
             let message = format!("{} is sealed and the cave has no key", f.what);
             f.log.report(f.span.clone(), message, "expected a [security] with a key_file");
+        }
+        if f.log.count() == problems && tracker.openxr.is_some() && tracker.axes != Axes::YUp {
+            let message = format!("{} has `openxr` and axes = \"z_up\"", f.what);
+            f.log.report(f.span.clone(), message, "expected \"y_up\", the axes of OpenXR, or no `axes`");
         }
         f.finish();
         tracker
@@ -193,6 +204,18 @@ fn read_dtrack_map(f: &mut Fields<'_>, users: &[String], has_vrpn: bool) -> Vec<
         f.log.report(f.span.clone(), message, "expected one tracker");
     }
     maps
+}
+
+fn read_openxr(f: &mut Fields<'_>, users: &[String], has_vrpn: bool, has_dtrack: bool) -> Option<String> {
+    let (user, value) = f.optional_text("openxr")?;
+    if !users.iter().any(|known| known == user) {
+        f.wrong("openxr", value, format!("a user of this tracker: {}", users.join(", ")));
+    }
+    if let Some((other, _)) = [("vrpn", has_vrpn), ("dtrack_map", has_dtrack)].into_iter().find(|(_, has)| *has) {
+        let message = format!("{} has `openxr` and `{other}`", f.what);
+        f.log.report(f.span.clone(), message, "expected one tracker");
+    }
+    Some(user.to_owned())
 }
 
 fn address_of(f: &Fields<'_>, key: &str, text: &str, value: &crate::parse::fields::Value<'_>) -> Option<IpAddr> {

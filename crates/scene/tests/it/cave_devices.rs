@@ -31,7 +31,14 @@ fn a_tracker_is_heard_on_this_machine_and_elsewhere_by_name() {
     assert_eq!((vrpn.vrpn.as_deref(), vrpn.vrpn_map), (Some("wall:3883"), vec![map]));
     let dtrack = of("[tracker]\ndtrack_map = [\"body:0=u/head\", \"flystick:1=u/buttons\"]\n").dtrack_map;
     assert_eq!((dtrack[0].device.as_str(), dtrack[1].sensor, dtrack.len()), ("body", 1, 2));
+    let headset = of("[tracker]\nusers = [\"eva\"]\nopenxr = \"eva\"\norigin_m = [0, 0, 1.6]\n");
+    assert_eq!((headset.openxr.as_deref(), headset.axes), (Some("eva"), Axes::YUp));
     let cases = [
+        ("[tracker]\nopenxr = \"other\"\n", "a user of this tracker: u"),
+        ("[tracker]\nopenxr = 7\n", "`openxr`"),
+        ("[tracker]\nopenxr = \"u\"\naxes = \"z_up\"\n", "the axes of OpenXR"),
+        ("[tracker]\nopenxr = \"u\"\ndtrack_map = [\"body:0=u/head\"]\n", "has `openxr` and `dtrack_map`"),
+        ("[tracker]\nopenxr = \"u\"\nvrpn = \"here:3883\"\nvrpn_map = [\"G=u/head\"]\n", "has `openxr` and `vrpn`"),
         ("[tracker]\ndtrack_map = [\"glove:0=u/hand/left\"]\n", "body:NUMBER or flystick:NUMBER"),
         ("[tracker]\ndtrack_map = [\"body:0=u/buttons\"]\n", "buttons of a flystick alone"),
         ("[tracker]\ndtrack_map = [\"body:0=other/head\"]\n", "a user of this tracker: u"),

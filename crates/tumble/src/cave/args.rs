@@ -116,6 +116,10 @@ pub struct ServeOptions {
     /// hand/right, or buttons of a flystick.
     #[arg(long, value_name = "MAP,…", value_delimiter = ',', conflicts_with = "vrpn")]
     pub dtrack_map: Vec<DeviceMap>,
+    /// Take head and hands of this user from a headset of this machine by OpenXR, without drawing into it; the runtime
+    /// needs XR_MND_headless. Users and origin are those of [tracker] in the cave file.
+    #[arg(long, value_name = "USER", conflicts_with_all = ["tracker", "vrpn", "dtrack_map"])]
+    pub openxr: Option<String>,
     /// Take the first gamepad of this machine for this user: sticks walk and turn, buttons are digits.
     #[arg(long, value_name = "USER")]
     pub gamepad: Option<String>,

@@ -66,7 +66,7 @@ pub fn facet(options: &FacetOptions) -> Result<(), Failure> {
 /// Shows a recorded run on the facets of a cave.
 pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let serve = &options.cave.serve;
-    let devices = serve.tracker.is_some() || serve.vrpn.is_some() || serve.gamepad.is_some();
+    let devices = serve.tracker.is_some() || serve.vrpn.is_some() || serve.openxr.is_some() || serve.gamepad.is_some();
     let users = serve.user_colliders || devices || serve.replay_input.is_some();
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
@@ -83,7 +83,7 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
         || sound
     {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --record-cameras, --user-colliders, --tracker, --vrpn, --gamepad, --sound, --audio, --replay-input, --contacts, --events, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --record-cameras, --user-colliders, --tracker, --vrpn, --openxr, --gamepad, --sound, --audio, --replay-input, --contacts, --events, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

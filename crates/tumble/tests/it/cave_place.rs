@@ -142,15 +142,7 @@ impl Place {
     }
 
     pub fn start(&self, what: &str, args: &[&str]) -> Process {
-        let mut child = self
-            .command(what, args)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let (said, wrong) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
-        Process { child, said: Some(said), wrong: Some(wrong) }
+        Process::start(&mut self.command(what, args))
     }
 
     /// Runs the command to its end, which must be a success; returns the summary.
@@ -204,6 +196,12 @@ pub struct Process {
 }
 
 impl Process {
+    pub fn start(command: &mut Command) -> Process {
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let (said, wrong) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
+        Process { child, said: Some(said), wrong: Some(wrong) }
+    }
+
     pub fn pid(&self) -> i32 {
         self.child.id() as i32
     }

@@ -3,9 +3,9 @@
 
 use crate::cave_place::{cave_of, in_place, make_runtime, run_key};
 use crate::common::{Folder, json, succeed, text};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;
-use std::process::{Child, ChildStderr, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
 use tumble::collide::{Pose, Vec3};
 use tumble::net::sync::udp::{SharedKey, Timing, UdpFacet};
@@ -43,7 +43,7 @@ pub struct Server {
     key: [u8; 32],
     hash: [u8; 32],
     // keeps the pipe open, so that the server can go on writing
-    _stderr: BufReader<ChildStderr>,
+    stderr: BufReader<ChildStderr>,
     sequence: u64,
 }
 
@@ -61,13 +61,9 @@ pub fn place(test: &str) -> (Folder, String, String) {
     (folder, scene, cave)
 }
 
-/// Starts a server that waits for its facets; returns its address too.
-fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, SocketAddr, BufReader<ChildStderr>) {
-    let mut child = in_place(folder, &[&["serve", scene, "--cave", cave], args].concat())
-        .stderr(Stdio::piped())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
+/// Starts a server by its command; returns its address too.
+fn listening(command: &mut Command) -> (Child, SocketAddr, BufReader<ChildStderr>) {
+    let mut child = command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let address = loop {
         let mut line = String::new();
@@ -79,9 +75,12 @@ fn serve(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> (Child, Soc
     (child, address, stderr)
 }
 
-/// Returns the server's hash of scene and cave, from its refusal of a facet with another hash.
-fn joined_hash(folder: &Folder, scene: &str, cave: &str) -> [u8; 32] {
-    let (mut child, address, _stderr) = serve(folder, scene, cave, &["--transport", "udp"]);
+/// Returns the server's hash of scene and cave, from its refusal of a facet with another hash. `like` is the command of
+/// the server.
+fn joined_hash(folder: &Folder, scene: &str, cave: &str, like: &Command) -> [u8; 32] {
+    let mut command = in_place(folder, &["serve", scene, "--cave", cave, "--transport", "udp"]);
+    command.envs(like.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    let (mut child, address, _stderr) = listening(&mut command);
     let mut stranger = connect(address, run_key(folder), "f", 0, [0; 32], scene);
     let start = Instant::now();
     let why = loop {
@@ -116,11 +115,17 @@ impl Server {
     }
 
     pub fn start_in_real_time(folder: &Folder, scene: &str, cave: &str, args: &[&str]) -> Server {
-        let hash = joined_hash(folder, scene, cave);
-        let (child, address, stderr) = serve(folder, scene, cave, args);
+        let command = in_place(folder, &[&["serve", scene, "--cave", cave], args].concat());
+        Server::of(folder, scene, cave, command)
+    }
+
+    /// Starts a server by its command, and its facet.
+    pub fn of(folder: &Folder, scene: &str, cave: &str, mut command: Command) -> Server {
+        let hash = joined_hash(folder, scene, cave, &command);
+        let (child, address, stderr) = listening(&mut command);
         let key = run_key(folder);
         let facet = connect(address, key, "f", 0, hash, scene);
-        Server { child, facet, address, key, hash, _stderr: stderr, sequence: 0 }
+        Server { child, facet, address, key, hash, stderr, sequence: 0 }
     }
 
     /// Connects one more facet.
@@ -177,8 +182,8 @@ impl Server {
         }
     }
 
-    /// Ends the session in order; no error may have occurred.
-    pub fn end(mut self) {
+    /// Ends the session in order; no error may have occurred. Returns the last lines of the server.
+    pub fn end(mut self) -> String {
         rustix::process::kill_process(
             rustix::process::Pid::from_raw(self.child.id() as i32).unwrap(),
             rustix::process::Signal::TERM,
@@ -195,6 +200,9 @@ impl Server {
             std::thread::sleep(Duration::from_millis(10));
         };
         assert!(status.success(), "{status}");
+        let mut said = String::new();
+        let _ = self.stderr.read_to_string(&mut said);
+        said
     }
 
     pub fn ball(&self) -> Vec3 {

@@ -14,6 +14,7 @@ mod cave_frames;
 mod cave_group_windows;
 mod cave_groups;
 mod cave_keys;
+mod cave_openxr;
 mod cave_outputs;
 mod cave_place;
 mod cave_priority;

@@ -5,6 +5,7 @@ use crate::cave::args::ServeOptions;
 use crate::cave::endpoints::key;
 use crate::cave::gamepad::{Gamepad, user_of};
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
+use crate::cave::tracker::openxr_client::OpenXrClient;
 use crate::cave::tracker::osc;
 use crate::cave::tracker::socket::{TrackerSocket, configured};
 use crate::cave::tracker::vrpn_client::VrpnClient;
@@ -23,6 +24,7 @@ const GAMEPAD_SOURCE: FacetNumber = FacetNumber::MAX - 3;
 pub struct InputDevices {
     tracker: Option<TrackerSocket>,
     vrpn: Option<VrpnClient>,
+    openxr: Option<OpenXrClient>,
     gamepad: Option<Gamepad>,
     replayed_input: Option<ReplayedInput>,
 }
@@ -42,26 +44,32 @@ impl InputDevices {
         // the command line's tracker takes the place of the cave file's
         let vrpn = match (&options.vrpn, &about.vrpn) {
             (Some(server), _) => Some((server, &options.vrpn_map)),
-            (None, Some(server)) if options.tracker.is_none() => Some((server, &about.vrpn_map)),
+            (None, Some(server)) if options.tracker.is_none() && options.openxr.is_none() => {
+                Some((server, &about.vrpn_map))
+            }
             _ => None,
         };
+        let is_default = options.tracker.is_none() && options.vrpn.is_none() && options.dtrack_map.is_empty();
+        let openxr = options.openxr.as_ref().or(about.openxr.as_ref().filter(|_| is_default));
         let gamepad = options.gamepad.as_ref().map(|name| user_of(name, &cave.users)).transpose()?;
         let gamepad = gamepad.filter(|_| live).map(|user| Gamepad::new(user, options.quiet));
         let wanted = configured(cave, options.tracker, &options.tracker_from, &options.dtrack_map)?
-            .filter(|_| live && vrpn.is_none());
+            .filter(|_| live && vrpn.is_none() && openxr.is_none());
         let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
         let tracker = wanted.as_ref().map(open).transpose()?;
         let connect = |(server, maps): (&String, &Vec<_>)| {
             VrpnClient::open(server, maps, &about, options.smoothing(), options.quiet)
         };
         let vrpn = vrpn.filter(|_| live).map(connect).transpose()?;
+        let follow = |user: &String| OpenXrClient::open(user, &about, options.smoothing(), options.quiet);
+        let openxr = openxr.filter(|_| live).map(follow).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
         }
         if let (Some(path), false) = (&options.replay_input, options.quiet) {
             eprintln!("input: replayed from {}; live input of windows and trackers is ignored", path.display());
         }
-        Ok(InputDevices { tracker, vrpn, gamepad, replayed_input })
+        Ok(InputDevices { tracker, vrpn, openxr, gamepad, replayed_input })
     }
 
     /// Returns whether input of facets is used.
@@ -77,7 +85,9 @@ impl InputDevices {
     /// Returns the inputs of tracker and gamepad since the last frame.
     pub fn inputs(&mut self) -> Vec<(FacetNumber, Input)> {
         let tracked = self.tracker.iter().flat_map(TrackerSocket::inputs);
-        let tracked = tracked.chain(self.vrpn.iter().flat_map(VrpnClient::inputs)).map(|input| (TRACKER_SOURCE, input));
+        let tracked = tracked.chain(self.vrpn.iter().flat_map(VrpnClient::inputs));
+        let tracked = tracked.chain(self.openxr.iter().flat_map(OpenXrClient::inputs));
+        let tracked = tracked.map(|input| (TRACKER_SOURCE, input));
         let now = Instant::now();
         let held = self.gamepad.iter_mut().filter_map(|gamepad| gamepad.input(now));
         tracked.chain(held.map(|input| (GAMEPAD_SOURCE, input))).collect()
@@ -97,7 +107,9 @@ impl InputDevices {
 
     /// Returns the tracker's counts.
     pub fn tracker_counts(&self) -> Option<osc::Counts> {
-        self.tracker.as_ref().map(TrackerSocket::counts).or_else(|| self.vrpn.as_ref().map(VrpnClient::counts))
+        let datagrams = self.tracker.as_ref().map(TrackerSocket::counts);
+        let vrpn = || self.vrpn.as_ref().map(VrpnClient::counts);
+        datagrams.or_else(vrpn).or_else(|| self.openxr.as_ref().map(OpenXrClient::counts))
     }
 
     /// Checks that replayed inputs gave the recorded states.

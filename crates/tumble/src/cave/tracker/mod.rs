@@ -1,8 +1,11 @@
-//! Input of a tracker: OSC messages or the output of DTrack over UDP, or the stream of a VRPN server.
+//! Input of a tracker: OSC messages or the output of DTrack over UDP, the stream of a VRPN server, or a headset by
+//! OpenXR.
 
 pub mod budget;
 mod dtrack;
+mod headset;
 pub mod one_euro;
+pub mod openxr_client;
 pub mod osc;
 pub mod relay;
 pub mod sealed;
