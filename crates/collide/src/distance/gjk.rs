@@ -26,11 +26,11 @@ use arrayvec::ArrayVec;
 const MAX_ITERATIONS: usize = 128;
 /// Difference of the bounds at which the iteration ends, in units of the largest difference of points.
 const CLOSE: f64 = 1e-14;
-/// Number of times that weights are solved for.
+/// Number of times that weights are solved for; once if the bounds may differ.
 const REFINEMENTS: usize = 3;
 
 /// A bounded convex body.
-pub(super) trait Convex {
+pub(crate) trait Convex {
     /// Returns the point that is farthest along `n`, of any length above 0.
     fn support(&self, n: &Vec3) -> Vec3;
 }
@@ -51,13 +51,15 @@ impl Convex for [Vec3; 3] {
 
 /// The distance of two convex bodies.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Separation {
+pub(crate) struct Separation {
     /// A point of A, and one of B, meters.
     pub points: [Vec3; 2],
     /// Their distance, meters: an upper bound. It is 0 if the bodies overlap.
     pub distance: f64,
     /// A lower bound, meters; at most 0 if the bodies overlap.
     pub least: f64,
+    /// The unit direction, from B to A, of the plane that gives the lower bound.
+    pub normal: Vec3,
 }
 
 /// A difference of two support points.
@@ -76,15 +78,23 @@ struct Nearest {
 /// Returns the distance of two convex bodies. The search ends early where the lower bound exceeds
 /// `enough` meters. `start` is a guess of the vector from B to A.
 pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough: f64) -> Separation {
+    separation_within(a, b, start, enough, 0.0)
+}
+
+/// The same, with bounds that may differ by `close` meters.
+pub(crate) fn separation_within(a: &impl Convex, b: &impl Convex, start: &Vec3, enough: f64, close: f64) -> Separation {
     let mut v = if start.norm() > 0.0 { *start } else { Vec3::x() };
     let mut nearest: Option<Nearest> = None;
-    let (mut least, mut scale) = (f64::NEG_INFINITY, 0.0f64);
+    let (mut least, mut normal, mut scale) = (f64::NEG_INFINITY, v / v.norm(), 0.0f64);
     for _ in 0..MAX_ITERATIONS {
         let points = [a.support(&-v), b.support(&v)];
         let w = points[0] - points[1];
         let length = v.norm();
-        (least, scale) = (least.max(v.dot(&w) / length), scale.max(w.norm()));
-        if least > enough || nearest.is_some() && length - least <= CLOSE * scale {
+        scale = scale.max(w.norm());
+        if v.dot(&w) / length > least {
+            (least, normal) = (v.dot(&w) / length, v / length);
+        }
+        if least > enough || nearest.is_some() && length - least <= close.max(CLOSE * scale) {
             break;
         }
         let mut simplex: ArrayVec<Vertex, 4> =
@@ -93,7 +103,7 @@ pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough:
             break; // the origin is inside, except for rounding
         }
         simplex.push(Vertex { w, points });
-        let next = nearest_of(&simplex);
+        let next = nearest_of(&simplex, if close > 0.0 { 1 } else { REFINEMENTS });
         if nearest.as_ref().is_some_and(|before| next.v.norm() >= before.v.norm()) {
             break;
         }
@@ -106,7 +116,7 @@ pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough:
     let Some(nearest) = nearest else {
         // the first plane separates them far enough
         let points = [a.support(&-v), b.support(&v)];
-        return Separation { points, distance: (points[0] - points[1]).norm(), least };
+        return Separation { points, distance: (points[0] - points[1]).norm(), least, normal };
     };
     let of = |side: usize| nearest.vertices.iter().map(|(vertex, weight)| vertex.points[side] * *weight).sum::<Vec3>();
     let length = nearest.v.norm();
@@ -115,12 +125,13 @@ pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough:
         points: [of(0), of(1)],
         distance: if apart { length } else { 0.0 },
         least: if apart { least } else { least.min(0.0) },
+        normal,
     }
 }
 
 /// Returns the point of the simplex that is closest to the origin. It lies on the hull of the last
 /// vertex and some of the others, since without the last one the previous point was the closest.
-fn nearest_of(simplex: &ArrayVec<Vertex, 4>) -> Nearest {
+fn nearest_of(simplex: &ArrayVec<Vertex, 4>, refinements: usize) -> Nearest {
     let last = simplex[simplex.len() - 1];
     let others = &simplex[..simplex.len() - 1];
     let alone = || Nearest { v: last.w, vertices: [(last, 1.0)].into_iter().collect() };
@@ -129,7 +140,7 @@ fn nearest_of(simplex: &ArrayVec<Vertex, 4>) -> Nearest {
         let chosen: ArrayVec<Vertex, 3> =
             (0..others.len()).filter(|k| subset >> k & 1 == 1).map(|k| others[k]).collect();
         let edges: ArrayVec<Vec3, 3> = chosen.iter().map(|vertex| vertex.w - last.w).collect();
-        let Some(weights) = weights(&edges, &-last.w) else { continue };
+        let Some(weights) = weights(&edges, &-last.w, refinements) else { continue };
         let v = edges.iter().zip(&weights).fold(last.w, |sum, (edge, weight)| sum + edge * *weight);
         if v.norm_squared() < best.v.norm_squared() {
             let rest = 1.0 - weights.iter().sum::<f64>();
@@ -142,10 +153,10 @@ fn nearest_of(simplex: &ArrayVec<Vertex, 4>) -> Nearest {
 
 /// Returns the weights of edges whose sum is closest to `p`; `None` if one is not above 0, their sum
 /// is not below 1, or the edges are dependent. Edges of a thin simplex leave a residual, which is
-/// solved for again.
-fn weights(edges: &[Vec3], p: &Vec3) -> Option<ArrayVec<f64, 3>> {
+/// solved for again, `refinements` times in all.
+fn weights(edges: &[Vec3], p: &Vec3, refinements: usize) -> Option<ArrayVec<f64, 3>> {
     let mut found: ArrayVec<f64, 3> = edges.iter().map(|_| 0.0).collect();
-    for _ in 0..REFINEMENTS {
+    for _ in 0..refinements {
         let rest = edges.iter().zip(&found).fold(*p, |rest, (edge, weight)| rest - edge * *weight);
         for (weight, more) in found.iter_mut().zip(weights_of_projection(edges, &rest)) {
             *weight += more;

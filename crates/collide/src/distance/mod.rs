@@ -2,7 +2,7 @@
 
 mod apart;
 mod depth;
-mod gjk;
+pub(crate) mod gjk;
 mod point;
 mod solid;
 

@@ -121,10 +121,17 @@ impl PairQuery<'_> {
         self.parts.shapes.iter().any(|shape| shape.has_tree())
     }
 
-    /// Returns whether the bounding boxes cannot come near each other.
+    /// Returns whether the bounding spheres or boxes cannot come near each other.
     pub fn is_separated(&self) -> bool {
+        let closing = |n: &Vec3| self.near + self.motion_bounds[0].along(n, &self.motion_bounds[1], self.prediction);
+        let off = self.parts.part_states[0].position() - self.parts.part_states[1].position();
+        let radii: f64 = self.parts.shapes.iter().map(|shape| shape.bounding_radius()).sum();
+        let distance = off.norm();
+        if distance > radii && distance - radii > closing(&(off / distance)) {
+            return true;
+        }
         let [a, b] = [0, 1].map(|k| OrientedBox::around(self.parts.shapes[k], &self.parts.part_states[k].pose));
-        are_separated(&a, &b, |n| self.near + self.motion_bounds[0].along(n, &self.motion_bounds[1], self.prediction))
+        are_separated(&a, &b, closing)
     }
 
     /// Returns the margin of the query, and the distance by which the gap may close.

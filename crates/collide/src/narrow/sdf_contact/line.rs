@@ -104,6 +104,9 @@ impl Query<'_> {
         edge: Option<&Edge>,
         found: &mut Collector,
     ) {
+        if self.least_height(ends) - radius > found.limit() {
+            return;
+        }
         let [start, end] = ends.map(|p| self.to_field(&p));
         let (middle, length) = (0.5 * (start + end), (end - start).norm());
         if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
@@ -115,7 +118,9 @@ impl Query<'_> {
             Line { start, along: (end - start) / length, length, radius, normals: &normals, index, edge, is_axis };
         if self.field.is_convex() {
             let start = self.sample(&line, 0.0);
-            if start.slope < FLAT_SLOPE {
+            // a convex distance is above its tangent
+            let least = start.hit.distance.min(start.height(length)) - radius;
+            if start.slope < FLAT_SLOPE && least <= found.limit() {
                 self.search(&line, start, self.sample(&line, length), found);
             }
         } else {

@@ -21,6 +21,7 @@ mod min_translation;
 mod query;
 mod rim;
 mod smooth;
+mod support_plane;
 mod tolerances;
 
 use super::reduce::Collector;
@@ -31,6 +32,7 @@ use crate::shape::Cone;
 use crate::{Contact, Pose, Vec3};
 use min_translation::SampledDistance;
 use query::{NearestCache, Query};
+use support_plane::SupportPlane;
 use tolerances::DEEP_OVERLAP;
 
 /// The elements of a body.
@@ -81,11 +83,25 @@ pub(in crate::narrow) fn contacts(
 /// Adds the contacts of the elements of both, in B's frame, and those of their faces for deep
 /// overlaps.
 fn elements(a: &Body, b: &Body, a_in_b: &Pose, size: f64, found: &mut Collector) -> SampledDistance {
+    match SupportPlane::pair([a, b], a_in_b, size, found.limit()) {
+        [Some(plane), _] if plane.is_beyond => SampledDistance { min: f64::INFINITY },
+        planes => elements_beside(planes, [a, b], a_in_b, size, found),
+    }
+}
+
+/// Adds the same contacts without those elements that lie above the planes, which bound B and A.
+fn elements_beside(
+    [of_b, of_a]: [Option<SupportPlane>; 2],
+    [a, b]: [&Body; 2],
+    a_in_b: &Pose,
+    size: f64,
+    found: &mut Collector,
+) -> SampledDistance {
     let b_in_a = a_in_b.inverse();
     let cache_first = NearestCache::new();
     let cache_second = NearestCache::new();
-    let first = Query::new([a, b], a_in_b, size, None, &cache_first);
-    let second = Query::new([b, a], &b_in_a, size, Some(a_in_b), &cache_second);
+    let first = Query::new([a, b], a_in_b, size, None, &cache_first).beside(of_b);
+    let second = Query::new([b, a], &b_in_a, size, Some(a_in_b), &cache_second).beside(of_a);
     first.run(&a.elements, found);
     second.run(&b.elements, found);
     if found.penetration() > DEEP_OVERLAP * size {

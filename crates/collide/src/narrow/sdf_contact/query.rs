@@ -3,6 +3,7 @@
 
 use super::super::reduce::Collector;
 use super::line_parts::Parts;
+use super::support_plane::SupportPlane;
 use super::tolerances::{FLAT_SLOPE, LEVEL_SLOPE, SLOPE_ROUNDING};
 use super::{Body, BodyElements};
 use crate::sdf::elements::{Edge, Elements, Group, MAX_CHILDREN, Point, Row};
@@ -38,6 +39,8 @@ pub(super) struct Query<'a> {
     pub(super) rotation: Mat3,
     pub(super) field: &'a dyn DistanceField,
     pub(super) mesh: Option<&'a MeshField>,
+    /// A plane that bounds the body with the field, in the frame of the elements.
+    plane: Option<SupportPlane>,
     /// Elements of the body with the field.
     pub(super) other: &'a BodyElements<'a>,
     pub(super) size: f64,
@@ -91,6 +94,7 @@ impl<'a> Query<'a> {
             rotation,
             field: other.field,
             mesh: other.mesh,
+            plane: None,
             other: &other.elements,
             size,
             is_cylinder: matches!(one.elements, BodyElements::Cylinder { .. }),
@@ -101,6 +105,11 @@ impl<'a> Query<'a> {
             frame_map,
             min_distance: Cell::new(f64::INFINITY),
         }
+    }
+
+    /// Leaves out the elements above a plane that bounds the other body, given in the frame of the elements.
+    pub(super) fn beside(self, plane: Option<SupportPlane>) -> Query<'a> {
+        Query { plane, ..self }
     }
 
     pub(super) fn run(&self, elements: &BodyElements, found: &mut Collector) {
@@ -144,8 +153,13 @@ impl<'a> Query<'a> {
     /// accesses overlap.
     fn query_group(&self, elements: &Elements, group: &Group, bound: f64, found: &mut Collector) {
         for children in elements.children_of(group).chunks(MAX_CHILDREN) {
-            let bounds: ArrayVec<f64, MAX_CHILDREN> =
-                children.iter().map(|child| self.bound(child.center_single(), || child.center())).collect();
+            let bounds: ArrayVec<f64, MAX_CHILDREN> = children
+                .iter()
+                .map(|child| match self.height(&child.center()) {
+                    height if height - child.reach(self.field.is_curved()) > found.limit() => height,
+                    height => self.bound(child.center_single(), || child.center()).max(height),
+                })
+                .collect();
             for (child, bound) in children.iter().zip(bounds) {
                 if bound - child.reach(self.field.is_curved()) <= found.limit() {
                     self.query_group(elements, child, bound, found);
@@ -155,6 +169,19 @@ impl<'a> Query<'a> {
         for point in elements.points_of(group) {
             self.query_vertex_and_edges(elements, point, bound - (point.at - group.center()).norm(), found);
         }
+    }
+
+    /// Returns the height of a point of the element above the plane that bounds the other body: a lower bound of its
+    /// distance, meters.
+    #[inline]
+    fn height(&self, local: &Vec3) -> f64 {
+        self.plane.as_ref().map_or(f64::NEG_INFINITY, |plane| plane.height(local))
+    }
+
+    /// Returns the height of the lower end of an edge.
+    #[inline]
+    pub(super) fn least_height(&self, ends: &[Vec3; 2]) -> f64 {
+        self.height(&ends[0]).min(self.height(&ends[1]))
     }
 
     /// Returns a lower bound of the distance at a point of the element, given in single precision
@@ -171,12 +198,16 @@ impl<'a> Query<'a> {
     /// distance there.
     fn query_vertex_and_edges(&self, elements: &Elements, point: &Point, bound: f64, found: &mut Collector) {
         let (fine, only_points) = (self.field.is_curved(), self.field.is_linear());
+        let height = self.height(&point.at);
+        let bound = bound.max(height);
         let longest = if only_points { 0.0 } else { point.longest[usize::from(fine)] };
         if bound - longest > found.limit() {
             return;
         }
-        let at = self.to_field(&point.at);
-        let seen = self.query_vertex(&at, elements, point, found);
+        let seen = match height > found.limit() {
+            true => PointBound { bound: height, up: None },
+            false => self.query_vertex(&self.to_field(&point.at), elements, point, found),
+        };
         let bound = bound.max(seen.bound);
         if only_points || bound - longest > found.limit() {
             return;

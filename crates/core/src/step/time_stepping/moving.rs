@@ -8,7 +8,8 @@ use crate::contact::time_of_impact::moving_pair;
 use crate::step::contacts::{free_motion_change, gyroscopic};
 use crate::step::{Moment, Workspace};
 use crate::world::Core;
-use tumble_collide::{Shape, Vec3};
+use std::sync::Arc;
+use tumble_collide::{Contact, Shape, Vec3};
 
 /// Moves the contacts that touch to `time` seconds after the start of the step. Others stay, so that
 /// what passes them keeps its distance; those that may bounce get their rates.
@@ -96,32 +97,47 @@ pub(super) fn add_motion(work: &mut Workspace, contact: usize, free: &FreeTerms,
 /// step. Contacts of convex shapes are found again in their places of that time: a row that is exact
 /// at any place on the way never allows overlap.
 pub(super) fn move_to_impacts(core: &Core, work: &mut Workspace, (fraction, rates): (&[f64], &[f64]), h: f64) {
-    let part_states = &core.derived.part_states;
     let mut found = Vec::new();
-    let contacts = work.contact_constraints.iter_mut().zip(&work.rows.blocks);
-    for ((constraint, block), rate) in contacts.zip(rates) {
-        let s = block.sides().iter().map(|side| fraction[side.u as usize]).fold(-1.0, f64::max);
-        if s < 0.0 {
-            continue;
-        }
-        let (sides, plane) = ([constraint.a, constraint.b], constraint.plane.clone());
-        let pair = moving_pair(core.objects(), &core.owners, part_states, sides, plane.as_deref());
-        let stops = constraint.restitution <= 0.0;
-        let convex = |shape: &Shape| matches!(shape, Shape::Mesh(_)) && shape.has_convex_parts();
-        let again = |shape: &&Shape| !shape.has_tree() || stops && convex(shape);
-        if let Some(pair) = pair.filter(|pair| pair.shapes.iter().all(again)) {
-            let reach = pair.reach(&constraint.contact.point, s * h);
-            let margin = constraint.contact.gap.abs() + reach + core.settings.drift_tolerance;
-            pair.contacts_after(s * h, margin, &mut found);
-            constraint.stay();
-            if let Some(contact) = found.iter().find(|contact| contact.feature == constraint.key.feature) {
-                constraint.find_again(contact, pair.part_states, s * h, true);
+    let mut first = 0;
+    for contacts in work.contact_constraints.chunk_by_mut(same_query) {
+        let end = first + contacts.len();
+        let sides = work.rows.blocks[first].sides();
+        let s = sides.iter().map(|side| fraction[side.u as usize]).fold(-1.0, f64::max);
+        if s >= 0.0 && !find_at_impact(core, contacts, s * h, &mut found) {
+            for (constraint, rate) in contacts.iter_mut().zip(&rates[first..end]) {
+                move_in_step(core, constraint, s * h);
+                let Moved { time, way, .. } = constraint.moved;
+                let turned = if time == s * h { -0.5 * time * time * rate } else { 0.0 };
+                constraint.moved = Moved { time, way, turned, ..Moved::default() };
             }
-        } else {
-            move_in_step(core, constraint, s * h);
-            let Moved { time, way, .. } = constraint.moved;
-            let turned = if time == s * h { -0.5 * time * time * rate } else { 0.0 };
-            constraint.moved = Moved { time, way, turned, ..Moved::default() };
+        }
+        first = end;
+    }
+}
+
+/// Returns whether two contacts are of the same parts, with the same plane if there is one.
+fn same_query(x: &ContactConstraint, y: &ContactConstraint) -> bool {
+    let planes = [x, y].map(|constraint| constraint.plane.as_ref().map(Arc::as_ptr));
+    x.key.pair == y.key.pair && planes[0] == planes[1]
+}
+
+/// Finds the contacts of two surfaces again at the time `t` of an impact, s, by one query. Returns false for shapes that are not
+/// convex. `found` is working memory.
+fn find_at_impact(core: &Core, contacts: &mut [ContactConstraint], t: f64, found: &mut Vec<Contact>) -> bool {
+    let (sides, plane) = ([contacts[0].a, contacts[0].b], contacts[0].plane.clone());
+    let pair = moving_pair(core.objects(), &core.owners, &core.derived.part_states, sides, plane.as_deref());
+    let stops = contacts.iter().all(|constraint| constraint.restitution <= 0.0);
+    let convex = |shape: &Shape| matches!(shape, Shape::Mesh(_)) && shape.has_convex_parts();
+    let again = |shape: &&Shape| !shape.has_tree() || stops && convex(shape);
+    let Some(pair) = pair.filter(|pair| pair.shapes.iter().all(again)) else { return false };
+    let margin = |c: &ContactConstraint| c.contact.gap.abs() + pair.reach(&c.contact.point, t);
+    let widest = contacts.iter().map(margin).fold(0.0, f64::max);
+    pair.contacts_after(t, widest + core.settings.drift_tolerance, found);
+    for constraint in contacts {
+        constraint.stay();
+        if let Some(contact) = found.iter().find(|contact| contact.feature == constraint.key.feature) {
+            constraint.find_again(contact, pair.part_states, t, true);
         }
     }
+    true
 }
