@@ -26,7 +26,7 @@
 //! (`joint_row.rs`).
 //!
 //! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
-//! as a whole (`direct/`). Islands whose factorization is too expensive are left to the sweeps, and
+//! as a whole (`direct/`), and a small one for which that fails from friction pyramids (`pyramids.rs`). Islands whose factorization is too expensive are left to the sweeps, and
 //! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
 //! ([`optimal_scale`]).
 
@@ -36,6 +36,7 @@ use super::folded::Folded;
 use super::joint_row::parallel_rows;
 use super::linkage::Linkages;
 use super::local::{Local, Progress, apply, with_memory, write_back};
+use super::pyramids;
 use super::reduced::Reduced;
 use super::relaxation::Relaxation;
 use super::{RIGID, RowSolver, SolveReport, SolverSettings, residual};
@@ -241,6 +242,7 @@ impl Solve<'_> {
                 outcome = self.solve_whole(plan, most);
                 outcome.relaxations = (f64::from(outcome.iterations) * cost * count as f64) as u32;
                 self.finish_rows(&mut outcome);
+                self.finish_by_pivoting(&mut outcome);
                 outcome.iterations += sweep;
                 outcome.relaxations += sweep * count as u32;
                 direct = true;
@@ -352,6 +354,27 @@ impl Solve<'_> {
             self.lambda.copy_from_slice(&found);
             self.read();
         }
+    }
+
+    /// Solves a small island that is still not finished from solutions on friction pyramids, then by Newton's method alone.
+    fn finish_by_pivoting(&mut self, outcome: &mut SolveReport) {
+        let allowed = self.settings.budget.is_none() && self.linkages.is_empty() && !is_wide(self.rows, self.blocks);
+        if outcome.converged || !allowed {
+            return;
+        }
+        let Some(mut island) = SmallIsland::new(self.rows, self.blocks, self.c) else { return };
+        write_back(self.locals, self.lambda);
+        let (problem, tolerance) = ((self.rows, self.blocks, self.c), self.settings.tolerance);
+        let mut solved = pyramids::solve(problem, &mut island, self.lambda, tolerance);
+        if !solved.converged {
+            let taken = solved.factorizations;
+            solved = island.solve(self.lambda, tolerance, true);
+            solved.factorizations += taken;
+        }
+        self.read();
+        outcome.converged = solved.converged;
+        outcome.iterations += solved.factorizations;
+        outcome.relaxations += (f64::from(solved.factorizations) * island.cost() * self.locals.len() as f64) as u32;
     }
 
     /// Scales the multipliers so that they add no energy.

@@ -49,6 +49,8 @@ const SLIDING_TOLERANCE: f64 = 1e-13;
 const ROUNDING: f64 = 1e-13;
 /// Lower bound of "the largest free value", m/s or m/s².
 const MIN_SCALE: f64 = 1e-3;
+/// Share of the mean diagonal by which rows yield where redundant contacts end the walk of [`on_pyramids`] on a ray.
+const YIELDING: f64 = 1e-9;
 /// Velocity error of the equality rows that counts as solved, relative to the largest free value.
 const ACCEPT: f64 = 1e-9;
 
@@ -130,7 +132,7 @@ fn solve(
         blocks.iter().for_each(|&b| lambda[rows.blocks[b as usize].range()].fill(0.0));
         return SolveReport { iterations: 0, converged: false, ray: false, relaxations: 0 };
     }
-    let problem = Problem::new(friction, rows, blocks, c);
+    let problem = Problem::new(friction, rows, blocks, c, None);
     let (m, q) = problem.matrix();
     let (local, pivots, converged) = match lemke(&m, &q) {
         LcpResult::Solution { z, pivots } => {
@@ -150,6 +152,24 @@ fn solve(
         first += count;
     }
     SolveReport { iterations: pivots, converged, ray: false, relaxations: 0 }
+}
+
+/// Solves an island on friction pyramids whose first edges are the directions of friction `along`, a force per row
+/// of the island. Returns the multipliers in the order of the rows, or `None` if pivoting finds no solution, or if the
+/// island has more than `most` unknowns.
+pub(super) fn on_pyramids(rows: &Rows, blocks: &[u32], c: &[f64], along: Vec<f64>, most: usize) -> Option<Vec<f64>> {
+    if unknowns_at_most(Friction::Pyramid, rows, blocks) > most || !finite(rows, blocks, c) {
+        return None;
+    }
+    let problem = Problem::new(Friction::Pyramid, rows, blocks, c, Some(along));
+    let (mut m, q) = problem.matrix();
+    for yielding in [0.0, YIELDING] {
+        problem.soften(&mut m, yielding);
+        if let LcpResult::Solution { z, .. } = lemke(&m, &q) {
+            return Some(problem.multipliers(&z).0);
+        }
+    }
+    None
 }
 
 /// Returns whether all numbers of the island's problem are finite; bounds of an interval may be
@@ -203,6 +223,8 @@ struct Problem {
     scale: f64,
     /// Multipliers at `z = 0`: the lower bounds of intervals.
     start: Vec<f64>,
+    /// A force per row; its tangential part at a contact has the direction of `d₁`.
+    along: Vec<f64>,
     columns: Vec<Column>,
     bounds: Vec<Bound>,
     /// Indices of the equality rows.
@@ -211,15 +233,26 @@ struct Problem {
 }
 
 impl Problem {
-    fn new(friction: Friction, rows: &Rows, blocks: &[u32], c: &[f64]) -> Problem {
+    /// The directions `d₁` are those of the tangential parts of `along`, a force per row, or against the free sliding velocity.
+    fn new(friction: Friction, rows: &Rows, blocks: &[u32], c: &[f64], along: Option<Vec<f64>>) -> Problem {
         let island = || blocks.iter().map(|&b| &rows.blocks[b as usize]);
         let k = rows.dense(blocks);
         let c: Vec<f64> = island().flat_map(|block| c[block.range()].iter().copied()).collect();
+        let along = along.unwrap_or_else(|| c.iter().map(|c| -c).collect());
         let scale = c.iter().fold(MIN_SCALE, |a: f64, c| a.max(c.abs()));
         let start = vec![0.0; c.len()];
         let equalities = Equalities::new(&[], 0, RANK);
-        let mut problem =
-            Problem { k, c, scale, start, columns: Vec::new(), bounds: Vec::new(), free: Vec::new(), equalities };
+        let mut problem = Problem {
+            k,
+            c,
+            scale,
+            start,
+            along,
+            columns: Vec::new(),
+            bounds: Vec::new(),
+            free: Vec::new(),
+            equalities,
+        };
         let mut first = 0;
         for block in island() {
             if rows.own(block, 0, 0) > f64::MIN_POSITIVE {
@@ -291,12 +324,12 @@ impl Problem {
         let live = [self.diagonal(row + 1) > floor, self.diagonal(row + 2) > floor];
         match live {
             [false, false] => None,
-            [true, false] => Some(([if self.c[row + 1] > 0.0 { -1.0 } else { 1.0 }, 0.0], None)),
-            [false, true] => Some(([0.0, if self.c[row + 2] > 0.0 { -1.0 } else { 1.0 }], None)),
+            [true, false] => Some(([if self.along[row + 1] < 0.0 { -1.0 } else { 1.0 }, 0.0], None)),
+            [false, true] => Some(([0.0, if self.along[row + 2] < 0.0 { -1.0 } else { 1.0 }], None)),
             [true, true] => {
-                let (x, y) = (self.c[row + 1], self.c[row + 2]);
+                let (x, y) = (self.along[row + 1], self.along[row + 2]);
                 let speed = nalgebra::ComplexField::hypot(x, y);
-                let along = if speed > SLIDING_TOLERANCE * self.scale { [-x / speed, -y / speed] } else { [1.0, 0.0] };
+                let along = if speed > SLIDING_TOLERANCE * self.scale { [x / speed, y / speed] } else { [1.0, 0.0] };
                 Some((along, Some([-along[1], along[0]])))
             }
         }
@@ -351,6 +384,13 @@ impl Problem {
         (0..n)
             .map(|i| self.c[i] + self.k[i * n..(i + 1) * n].iter().zip(lambda).map(|(k, l)| k * l).sum::<f64>())
             .collect()
+    }
+
+    /// Adds a share of the mean diagonal to the diagonal of the columns.
+    fn soften(&self, m: &mut [f64], share: f64) {
+        let (count, n) = (self.columns.len(), self.columns.len() + self.bounds.len());
+        let mean = (0..count).map(|i| m[i * n + i]).sum::<f64>() / count.max(1) as f64;
+        (0..count).for_each(|i| m[i * n + i] += share * mean);
     }
 
     /// Returns the island's multipliers, and the largest remaining velocity of an equality row.

@@ -18,6 +18,7 @@ mod linkage;
 mod local;
 mod objects;
 mod one_contact;
+mod pyramids;
 mod reduced;
 mod relaxation;
 mod residual;

@@ -15,7 +15,7 @@ pub(super) struct Solves<'a> {
     report: &'a mut StepReport,
     /// Largest residual of a converged solve, m/s.
     tolerance: f64,
-    /// Whether a larger residual means that a solve did not converge. Pivoting solvers solve another
+    /// Whether the residual decides that a solve converged. Pivoting solvers solve another
     /// model, so their residuals say nothing about that.
     exact_cone: bool,
     /// Number of islands so far.
@@ -37,8 +37,9 @@ impl<'a> Solves<'a> {
         let island = self.islands;
         self.islands += 1;
         let Some((mut outcome, largest)) = solved else { return };
-        // sweeps that change little may still be far from the solution; a solver that aims higher may still be near enough
         if self.exact_cone {
+            // not by the criterion of the solver: sweeps that change little may still be far from the solution, and
+            // those that go on may be at it
             outcome.converged = largest.residual <= self.tolerance;
         }
         self.report.solved(outcome);

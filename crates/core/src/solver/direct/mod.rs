@@ -90,7 +90,7 @@ struct System<'a> {
 
 /// Result of a direct solve.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Direct {
+pub(in crate::solver) struct Direct {
     pub factorizations: u32,
     /// Whether the error is within ten times the tolerance.
     pub converged: bool,

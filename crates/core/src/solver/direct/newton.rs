@@ -24,6 +24,7 @@
 //! the rest.
 
 use super::choice::{Choice, Derivative, Point};
+use super::cone::length;
 use super::dense;
 use super::island::{Island, Kind, LocalBlock, largest};
 use super::multipliers::Multipliers;
@@ -207,6 +208,40 @@ impl<'a> SmallIsland<'a> {
             self.island.write(&best.lambda, lambda);
         }
         Direct { factorizations: best.taken, converged: best.is_solved() }
+    }
+
+    /// Takes at most `most` steps from other multipliers, one per row of the island, and replaces those in `lambda` if it
+    /// finds better ones.
+    pub fn solve_from(&mut self, start: &[f64], most: u32, lambda: &mut [f64], tolerance: f64) -> Direct {
+        let tolerance = self.island.tolerance(tolerance);
+        let before = self.error(&self.at(self.island.read(lambda)));
+        let at = self.at(start.to_vec());
+        let error = self.error(&at);
+        let mut best = Best { lambda: start.to_vec(), other: Iterate::default(), error, taken: 0, tolerance };
+        self.follow(at, &mut best, most);
+        if best.error < before || before.is_nan() {
+            self.island.write(&best.lambda, lambda);
+        }
+        Direct { factorizations: best.taken, converged: best.is_solved() }
+    }
+
+    /// Returns the multipliers of the island, one per row.
+    pub fn read(&self, lambda: &[f64]) -> Vec<f64> {
+        self.island.read(lambda)
+    }
+
+    /// Returns a force per row, in the direction of friction at contacts: against the velocity of those that slide, the
+    /// multipliers of the others.
+    pub fn directions(&self, lambda: &[f64]) -> Vec<f64> {
+        let at = self.at(lambda.to_vec());
+        let mut along = lambda.to_vec();
+        for block in &self.island.blocks {
+            let point = at.point(block);
+            if point.choice(block) == Choice::Slide && length(point.w[1], point.w[2]) > 0.0 {
+                along[block.range()].iter_mut().zip(point.w).for_each(|(along, w)| *along = -w);
+            }
+        }
+        along
     }
 
     /// Takes at most `most` steps with the choices that each iterate asks for.
