@@ -26,8 +26,9 @@
 //! (`joint_row.rs`).
 //!
 //! An island that is not finished when its sweeps have cost as much as [`FACTORIZATIONS`] is solved
-//! as a whole (`direct/`), and a small one for which that fails from friction pyramids (`pyramids.rs`). Islands whose factorization is too expensive are left to the sweeps, and
-//! so are large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
+//! as a whole (`direct/`), and a small one for which that fails from friction pyramids
+//! (`pyramids.rs`). Islands whose factorization is too expensive are left to the sweeps, and so are
+//! large islands in motion. A solve that ends unfinished is scaled so that it adds no energy
 //! ([`optimal_scale`]).
 
 use super::direct::{Plan, SmallIsland, is_wide};
