@@ -246,9 +246,10 @@ impl Rows {
                 add_gram(&mut dense, n, &of_object);
                 continue;
             }
-            for (end, &(_, (i, a))) in of_object.iter().enumerate() {
+            let trimmed: Vec<Response> = of_object.iter().map(|&(_, (row, y))| (row, without_zeros(y))).collect();
+            for (end, &(i, a)) in trimmed.iter().enumerate() {
                 let row = &mut dense[i * n..][..i + 1];
-                of_object[..=end].iter().for_each(|&(_, (j, b))| row[j] += dot(a, b));
+                trimmed[..=end].iter().for_each(|&(j, b)| row[j] += dot_of_shorter(a, b));
             }
         }
         for i in 0..n {
@@ -284,6 +285,23 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
         _ if a.len() < 8 => a.iter().zip(b).map(|(a, b)| a * b).sum(),
         _ => long_dot(a, b),
     }
+}
+
+/// Returns the numbers up to the last one that is not 0, by whole groups of [`sum_long`]: the response of a joint ends with
+/// its own velocities.
+fn without_zeros(y: &[f64]) -> &[f64] {
+    if y.len() <= 8 {
+        return y;
+    }
+    let used = y.iter().rposition(|x| *x != 0.0).map_or(0, |last| last + 1);
+    &y[..used.next_multiple_of(8).min(y.len())]
+}
+
+/// Returns the product of two responses of one object [`without_zeros`], with the bits of [`dot`] of the whole ones.
+#[inline]
+fn dot_of_shorter(a: &[f64], b: &[f64]) -> f64 {
+    let len = a.len().min(b.len());
+    dot(&a[..len], &b[..len])
 }
 
 /// Writes the products of the rows of a row-major matrix with a vector, with the bits of [`dot`].

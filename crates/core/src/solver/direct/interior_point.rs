@@ -29,7 +29,8 @@
 //! z_lo − z_hi`. An equality takes `δλ = −(w + Yᵀδu)/(R + ε)`; the small `ε` keeps redundant rows
 //! regular and its error goes with the iterations.
 //!
-//! With the shift held (`convex.rs`) `D = T`, and what is solved is convex.
+//! Without the shift `D = T`, and what is solved is convex: from any start the iteration ends in the one `u` that there is. If
+//! nothing slides there, as in a house of cards, the shift is 0, so it is Coulomb's solution too.
 //!
 //! Multipliers of redundant contacts end in the middle of what is possible, so four equal corners of
 //! a box carry equal loads. Source of the shift within the iteration: Acary, Brémond and Huber, *On
@@ -97,33 +98,26 @@ pub(super) fn solve(
     cheap: bool,
     most: u32,
 ) -> (f64, u32) {
-    run(system, lambda, None, tolerances, cheap, most)
+    run(system, lambda, false, tolerances, cheap, most)
 }
 
-/// As [`solve`], of the convex problem in which the shift of each block is held: `shift` has the sliding speeds, m/s. From
-/// any start it ends in the one solution `u` that there is. The error is that of Coulomb's law all the same.
-pub(super) fn solve_convex(
-    system: &mut System,
-    lambda: &mut [f64],
-    shift: &[f64],
-    tolerance: f64,
-    most: u32,
-) -> (f64, u32) {
-    run(system, lambda, Some(shift), (tolerance, 0.0), true, most.min(CONVEX))
+/// As [`solve`], of the convex problem without the shift. The error is that of Coulomb's law all the same.
+pub(super) fn solve_convex(system: &mut System, lambda: &mut [f64], tolerance: f64, most: u32) -> (f64, u32) {
+    run(system, lambda, true, (tolerance, 0.0), true, most.min(CONVEX))
 }
 
-/// Iterates from the middle of the cones, with the shift held or in motion.
+/// Iterates from the middle of the cones, without the shift if `convex`.
 fn run(
     system: &mut System,
     lambda: &mut [f64],
-    shift: Option<&[f64]>,
+    convex: bool,
     (tolerance, enough): (f64, f64),
     cheap: bool,
     most: u32,
 ) -> (f64, u32) {
     let (mut best, mut taken, mut history) = (f64::INFINITY, 0, Vec::new());
     let mut state = Interior::new(&system.island);
-    state.shift = shift.map(<[f64]>::to_vec);
+    state.convex = convex;
     loop {
         let error = state.linearize(&system.island);
         let (span, progress) = PROGRESS[usize::from(!cheap)];
@@ -156,8 +150,8 @@ struct Interior {
     gains: Vec<M3>,
     /// `r_u`.
     rest: Vec<f64>,
-    /// Sliding speeds of the shifts, if they are held.
-    shift: Option<Vec<f64>>,
+    /// Whether the shift is left out.
+    convex: bool,
     /// Mean of `l·z`.
     mean: f64,
     /// Number of complementarity conditions.
@@ -210,7 +204,7 @@ impl Interior {
             linear: vec![Linear::default(); island.blocks.len()],
             gains: vec![[[0.0; 3]; 3]; island.blocks.len()],
             rest: Vec::new(),
-            shift: None,
+            convex: false,
             mean: 0.0,
             conditions: live().map(conditions).sum::<f64>().max(1.0),
             work: Vec::new(),
@@ -235,8 +229,7 @@ impl Interior {
         for (i, b) in island.blocks.iter().enumerate() {
             let w = island.row_velocity(b, &self.u, &self.lambda);
             sum += complementarity(b, &self.points[i]);
-            let held = self.shift.as_ref().map(|shift| shift[i]);
-            self.linear[i] = Linear::new(b, &self.points[i], (w, held), still);
+            self.linear[i] = Linear::new(b, &self.points[i], w, still, self.convex);
             self.gains[i] = self.linear[i].gain;
         }
         self.mean = sum / self.conditions;
@@ -335,7 +328,7 @@ fn bounds(b: &LocalBlock, p: &Point) -> impl Iterator<Item = (usize, f64, f64, f
 }
 
 impl Linear {
-    fn new(b: &LocalBlock, p: &Point, (w, held): (V3, Option<f64>), still: f64) -> Linear {
+    fn new(b: &LocalBlock, p: &Point, w: V3, still: f64, convex: bool) -> Linear {
         let mut linear = Linear { epsilon: epsilon_of(b), ..Linear::default() };
         let epsilon = linear.epsilon;
         match b.kind {
@@ -356,10 +349,10 @@ impl Linear {
             Kind::Cone { mu } => {
                 let speed = length(w[1], w[2]);
                 let soft = length(speed, still).max(f64::MIN_POSITIVE);
-                if held.is_none() {
+                if !convex {
                     linear.slide = [w[1] / soft, w[2] / soft];
                 }
-                let shift = held.unwrap_or(speed);
+                let shift = if convex { 0.0 } else { speed };
                 linear.rest = [p.z[0] - (w[0] / mu + shift), p.z[1] - w[1], p.z[2] - w[2]];
                 linear.scaling = Scaling::new(p.l, p.z);
                 linear.response = linear.scaling.regular_inverse(epsilon);

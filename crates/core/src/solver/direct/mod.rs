@@ -9,10 +9,10 @@
 //! 1. from multipliers that are near, a few steps of semismooth Newton with a proximal term (`proximal.rs`);
 //! 2. else the interior point method from the beginning (`interior_point.rs`);
 //! 3. and semismooth Newton for the digits that it leaves;
-//! 4. if that is not enough, the interior point method with a held shift, of an island at rest (`convex.rs`);
-//! 5. then the method of multipliers with a lagged shift (`lagged.rs`);
-//! 6. of a small island that is still not solved, semismooth Newton from the forces with which all
-//!    contacts stick.
+//! 4. if that is not enough, the method of multipliers with a lagged shift (`lagged.rs`);
+//! 5. then, of an island at rest, the interior point method without the shift, and the last digits again.
+//!
+//! A small island that is still not solved is solved from friction pyramids (`pyramids.rs`).
 //!
 //! All of them factor matrices `1 + Σ Y·G·Yᵀ` with a 3×3 matrix `G` per contact (`lu.rs`), with one block
 //! row per object (`structure.rs`): linear cost in a chain or a tower, more where contacts form
@@ -21,7 +21,6 @@
 
 mod choice;
 mod cone;
-mod convex;
 mod dense;
 mod interior_point;
 mod island;
@@ -59,8 +58,6 @@ const NEAR: (f64, f64) = (1e-2, 1e-5);
 const FACTORS: (u32, u32, u32) = (8, 30, 8);
 /// Maximum number of factorizations with a lagged shift, for a small and a large island.
 const LAGGED: (u32, u32) = (150, 20);
-/// Penalties of the forces with which all contacts stick, in the order in which they are tried.
-const STICKING: [f64; 3] = [1e9, 1e6, 1e4];
 /// Error, relative to the fastest row, of an island in motion of more than this number of degrees of freedom below which little
 /// is left to gain.
 const NEARLY: (f64, usize) = (1e-7, 36);
@@ -168,10 +165,6 @@ impl<'a> Plan<'a> {
                 proximal::solve(system, &mut own, error, tolerance, (last.min(most - taken), cheap));
             (error, taken) = (reached, taken + factors);
         }
-        if error > tolerance.solved && (self.sliding == 0.0 || at_rest && cheap && !small) {
-            let (reached, factors) = convex::solve(system, &mut own, error, tolerance, (most - taken, cheap));
-            (error, taken) = (reached, taken + factors);
-        }
         let nearly = !at_rest && system.island.dof > NEARLY.1 && error <= NEARLY.0 * fastest;
         if error > tolerance.solved && error.is_finite() && cheap {
             let limit = if small { LAGGED.0 } else { LAGGED.1 };
@@ -179,20 +172,15 @@ impl<'a> Plan<'a> {
             let (reached, factors) = lagged::solve(system, &mut own, error, tolerance, limit.min(most - taken));
             (error, taken) = (reached, taken + factors);
         }
-        for penalty in STICKING.into_iter().filter(|_| small && !nearly) {
-            if error <= tolerance.solved || taken + 1 >= most {
-                break;
-            }
-            taken += 1;
-            let Some(mut stuck) = proximal::sticking(system, &own, penalty) else { continue };
-            let near = system.island.error_of(&stuck);
-            if near.is_finite() {
-                let left = last.min(most - taken);
-                let (reached, factors) = proximal::solve(system, &mut stuck, near, tolerance, (left, cheap));
-                taken += factors;
-                if reached < error || error.is_nan() {
-                    (error, own) = (reached, stuck);
-                }
+        if error > tolerance.solved && (self.sliding == 0.0 || at_rest && cheap && !small) {
+            let mut convex = own.clone();
+            let (reached, factors) = interior_point::solve_convex(system, &mut convex, tolerance.solved, most - taken);
+            taken += factors;
+            let left = FACTORS.2.min(most - taken);
+            let (reached, factors) = proximal::solve(system, &mut convex, reached, tolerance, (left, cheap));
+            taken += factors;
+            if reached < error || error.is_nan() {
+                (error, own) = (reached, convex);
             }
         }
         if error < start || start.is_nan() {

@@ -30,6 +30,7 @@ use super::island::{Island, Kind, LocalBlock, largest};
 use super::multipliers::Multipliers;
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, multiply};
+use std::ops::Range;
 
 /// Maximum number of rows of an island, and of one with a wide object, of which a sweep costs nearly as much as a step
 /// of the elimination.
@@ -242,6 +243,18 @@ impl<'a> SmallIsland<'a> {
             }
         }
         along
+    }
+
+    /// Returns the blocks but contacts that open by more than `far` of the fastest row, each with its rows.
+    pub fn near(&self, lambda: &[f64], far: f64) -> Vec<(usize, Range<usize>)> {
+        let at = self.at(lambda.to_vec());
+        let is_near = |block: &LocalBlock| {
+            let point = at.point(block);
+            let opens = point.w[0] - block.diagonal * point.lambda[0] > far * self.island.fastest;
+            !(opens && matches!(block.kind, Kind::Cone { .. }))
+        };
+        let blocks = self.island.blocks.iter().enumerate();
+        blocks.filter(|(_, block)| is_near(block)).map(|(i, block)| (i, block.range())).collect()
     }
 
     /// Takes at most `most` steps with the choices that each iterate asks for.

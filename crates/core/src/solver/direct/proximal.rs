@@ -84,50 +84,6 @@ pub(super) fn solve(
     (error, taken)
 }
 
-/// Returns the multipliers with which all contacts stick and all other rows hold, if there are any: a
-/// light body that heavy ones wedge in needs forces far above those of its approach, which sweeps and
-/// the interior point method do not find. Rows may yield by `1/penalty` of their response: without
-/// that, redundant contacts that disagree by little would get forces of any size.
-pub(super) fn sticking(system: &mut System, own: &[f64], penalty: f64) -> Option<Vec<f64>> {
-    let System { island, structure, factor } = system;
-    let gain = |b: &LocalBlock| {
-        let rho = penalty / b.diagonal;
-        let mut gain = [[0.0; 3]; 3];
-        match b.kind {
-            Kind::Held => {}
-            Kind::Cone { .. } => (0..3).for_each(|k| gain[k][k] = rho),
-            _ => gain[0][0] = rho / (1.0 + rho * b.compliance),
-        }
-        gain
-    };
-    let gains: Vec<M3> = island.blocks.iter().map(gain).collect();
-    if !factor.factor(structure, island, &gains) {
-        return None;
-    }
-    let forces = |w: V3, gain: &M3| [0, 1, 2].map(|k| -gain[k][k] * w[k]);
-    let mut u = vec![0.0; island.dof];
-    for (b, gain) in island.blocks.iter().zip(&gains) {
-        let mut c = [0.0; 3];
-        c.iter_mut().zip(&island.c[b.range()]).for_each(|(to, c)| *to = *c);
-        let force = forces(c, gain);
-        let held = b.kind == Kind::Held;
-        island.push(b, if held { &own[b.range()] } else { &force[..b.rows] }, &mut u);
-    }
-    factor.solve(structure, island, &mut u, &mut Vec::new());
-    let mut lambda = own.to_vec();
-    for (b, gain) in island.blocks.iter().zip(&gains).filter(|(b, _)| b.kind != Kind::Held) {
-        let force = forces(free(island, b, &u), gain);
-        let force = match b.kind {
-            Kind::Cone { mu } => project(force, mu).0,
-            Kind::HalfLine => force.map(|x| x.max(0.0)),
-            Kind::Interval { lo, hi } => force.map(|x| x.max(lo).min(hi)),
-            Kind::Held | Kind::Equality => force,
-        };
-        lambda[b.range()].copy_from_slice(&force[..b.rows]);
-    }
-    Some(lambda)
-}
-
 pub(super) struct Proximal<'s, 'a> {
     pub system: &'s mut System<'a>,
     pub penalty: f64,
