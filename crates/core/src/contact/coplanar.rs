@@ -15,7 +15,7 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `B` | a tile |
-//! | `y₁`, `n₁` | point on a tile and normal of the nearest contact that gives such a plane; the normal points to `A` |
+//! | `y₁`, `n₁` | point on a tile of the nearest contact that gives such a plane, and normal of the tile there; it points to `A` |
 //! | `yᵢ`, `gapᵢ` | point on the plane and gap of a contact of `A` with the plane |
 //! | `d` | signed distance from a tile |
 //!
@@ -24,7 +24,7 @@
 //! the plane lies on no tile, all contacts stay.
 
 use crate::contact::detect::ContactConstraint;
-use crate::contact::internal_edges::{Entry, FLUSH, LIFT, Side, Surroundings};
+use crate::contact::internal_edges::{Entry, FLUSH, LEVEL, LIFT, Side, Surroundings};
 use crate::contact::motion::Moved;
 use crate::contact::time_of_impact::moving_pair;
 use crate::object::FilteredPart;
@@ -74,6 +74,8 @@ impl PlaneContacts {
         constraints: &[ContactConstraint],
     ) -> Option<PlaneContacts> {
         nearest.iter().find_map(|first| {
+            // at the edge of a tile the normal of a contact may be tilted by a little
+            let first = &around.on_face(first);
             let tiles = tiles(around, first, (entries, nearest), constraints);
             if tiles.len() < 2 {
                 return None;
@@ -164,6 +166,16 @@ fn contacts(
 }
 
 impl Surroundings<'_> {
+    /// Returns a contact with point and normal of the face that it touches, if its normal is nearly that of the face.
+    fn on_face(&self, entry: &Entry) -> Entry {
+        let face = self.closest(entry.side(), &entry.point, self.drift_tolerance);
+        let level = |normal: &Vec3| (normal - entry.normal).norm_squared() < LEVEL * LEVEL;
+        match face.filter(|face| level(&face.normal)) {
+            Some(face) => Entry { point: face.point, normal: face.normal, ..*entry },
+            None => *entry,
+        }
+    }
+
     /// Returns whether a part collides on all sides by its shapes.
     fn has_two_sides(&self, part: u32) -> bool {
         let (entry, part) = self.table.entry(part);

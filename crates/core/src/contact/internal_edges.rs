@@ -42,7 +42,7 @@ const MAX_OVERHANG: f64 = 2e-3;
 /// Difference of equal normals.
 const SAME_NORMAL: f64 = 1e-7;
 /// Difference of the normals of contacts that support alike.
-const LEVEL: f64 = 1e-3;
+pub(crate) const LEVEL: f64 = 1e-3;
 /// Difference of equal gaps, in drift tolerances.
 const SAME_GAP: f64 = 1e-8;
 /// Maximum number of contacts of a part that are compared; those of a part with more all stay.
