@@ -188,7 +188,7 @@ impl Case {
             Mover::Box | Mover::Cylinder | Mover::MeshBox if self.rolls && turns => None,
             // the contact with the next cell is a new one, which divides the step
             _ if self.stepper == "backtracking" => Some(2e-5),
-            Mover::Cylinder => Some(5e-6),
+            Mover::Capsule | Mover::Cylinder => Some(5e-6),
             _ => Some(1e-6),
         }
     }
