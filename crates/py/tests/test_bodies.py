@@ -57,6 +57,8 @@ def test_damping_gravity_scale_and_locks():
         world.step(round(1 / dt))
         assert rail.position[2] == pytest.approx(-9.81 / 2, abs=1e-9)
         assert light.velocity[2] == pytest.approx(-9.81 / 2, abs=1e-9)
+        rail.locked = "y"
+        assert rail.locked == ("y",)
         rail.locked = ("y", "z")
         assert rail.velocity == pytest.approx([0, 0, 0])
     with pytest.raises(tumble.InvalidValueError, match="locked: `w` is not known"):

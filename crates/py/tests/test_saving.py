@@ -52,6 +52,12 @@ def test_joints_keep_their_names_and_drives(tmp_path, root):
     assert (again.articulation("arm").q == arm.q).all()
 
 
+def test_a_missing_folder_is_named(tmp_path):
+    for write in (tumble.World().save_scene, made().save_mjcf):
+        with pytest.raises(tumble.MissingFileError, match=f"there is no folder {tmp_path / 'none'}"):
+            write(tmp_path / "none" / "world.file")
+
+
 def test_settings_of_load_count(tmp_path):
     made().save_scene(tmp_path / "now.toml")
     again = tumble.World.load(tmp_path / "now.toml", dt=0.002, stepper="backtracking")

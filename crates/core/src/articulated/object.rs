@@ -348,6 +348,10 @@ impl Collidable for ArticulatedBody {
         self.link_of(part).is_some()
     }
 
+    fn carrier(&self, part: usize) -> usize {
+        self.link_of(part).unwrap_or(part)
+    }
+
     fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
         self.links_collide(self.link_of(part_a), self.link_of(part_b))
     }

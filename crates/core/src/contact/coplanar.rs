@@ -1,5 +1,5 @@
-//! Coplanar faces: the tiles of a floor act on a moving body as one plane. The bodies that form the plane do
-//! not move against each other; in heaps of moving ones all contacts stay.
+//! Coplanar faces: the tiles of a floor act on another body as one plane. The tiles are bodies that no force moves and
+//! that have one velocity, or shapes of one compound or link, which may move; in heaps of moving bodies all contacts stay.
 //!
 //! The narrow phase knows one pair at a time. The side of a cylinder touches the tile below it along a line,
 //! which ends at the seam, and the edge of the next tile along another; on the surface of both tiles
@@ -14,7 +14,8 @@
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | `y₁`, `n₁` | point on a tile and normal of the nearest contact that gives such a plane; the normal points to `A` |
+//! | `B` | a tile |
+//! | `y₁`, `n₁` | point on a tile of the nearest contact that gives such a plane, and normal of the tile there; it points to `A` |
 //! | `yᵢ`, `gapᵢ` | point on the plane and gap of a contact of `A` with the plane |
 //! | `d` | signed distance from a tile |
 //!
@@ -23,20 +24,30 @@
 //! the plane lies on no tile, all contacts stay.
 
 use crate::contact::detect::ContactConstraint;
-use crate::contact::internal_edges::{Entry, FLUSH, LIFT, Surroundings};
+use crate::contact::internal_edges::{Entry, FLUSH, LEVEL, LIFT, Side, Surroundings};
 use crate::contact::motion::Moved;
 use crate::contact::time_of_impact::moving_pair;
-use crate::object::part_state::PartState;
+use crate::object::FilteredPart;
+use crate::object::collidable::Collidable;
 use std::sync::Arc;
-use tumble_collide::{Pose, Quat, Shape, Vec3};
+use tumble_collide::{Contact, Pose, Quat, Shape, Vec3};
 
-/// The plane of several parts, as the other side of a contact.
+/// The plane of several tiles, as the other side of a contact.
 #[derive(Debug)]
 pub(crate) struct FacePlane {
-    /// Its normal is z of the frame.
-    pub state: PartState,
+    /// Row of the part that it moves with.
+    pub carrier: u32,
+    /// Its pose in the frame of that part; z is its normal.
+    pub pose: Pose,
     /// Whether it is side A of its contacts.
     pub is_a: bool,
+}
+
+impl FacePlane {
+    /// Returns its side of its contacts, 0 for A.
+    pub fn side(&self) -> usize {
+        usize::from(!self.is_a)
+    }
 }
 
 /// The shape of a [`FacePlane`].
@@ -48,27 +59,29 @@ fn to_z(n: &Vec3) -> Quat {
         .unwrap_or_else(|| Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI))
 }
 
-/// Contacts with a plane, and the rows of the parts whose contacts they replace.
+/// Contacts with a plane, and the tiles whose contacts they replace.
 pub(crate) struct PlaneContacts {
-    pub tiles: Vec<u32>,
+    pub tiles: Vec<Side>,
     pub contacts: Vec<ContactConstraint>,
 }
 
 impl PlaneContacts {
-    /// Returns the contacts of a part with the plane that other parts form; `None` if there is no such plane.
-    /// `entries` are its contacts and `nearest` the nearest one with each other part.
+    /// Returns the contacts of a part with the plane that tiles form; `None` if there is no such plane.
+    /// `entries` are its contacts and `nearest` the nearest one with each tile.
     pub fn find(
         around: &Surroundings,
         (entries, nearest): (&[Entry], &[Entry]),
         constraints: &[ContactConstraint],
     ) -> Option<PlaneContacts> {
         nearest.iter().find_map(|first| {
+            // at the edge of a tile the normal of a contact may be tilted by a little
+            let first = &around.on_face(first);
             let tiles = tiles(around, first, (entries, nearest), constraints);
             if tiles.len() < 2 {
                 return None;
             }
             let contacts = contacts(around, first, &tiles, constraints)?;
-            Some(PlaneContacts { tiles: tiles.iter().map(|tile| tile.other).collect(), contacts })
+            Some(PlaneContacts { tiles: tiles.iter().map(Entry::side).collect(), contacts })
         })
     }
 }
@@ -78,7 +91,7 @@ fn is_a(entry: &Entry, constraints: &[ContactConstraint]) -> bool {
     constraints[entry.contact as usize].a == entry.other
 }
 
-/// Returns an entry of each part that has a face in the plane of `first` and does not rise above it.
+/// Returns an entry of each tile that has a face in the plane of `first` and does not rise above it.
 fn tiles(
     around: &Surroundings,
     first: &Entry,
@@ -88,27 +101,26 @@ fn tiles(
     let turn = to_z(&first.normal);
     let (height, tolerance) = ((turn * first.point).z, around.drift_tolerance);
     let velocity = |part: u32| {
-        let state = &around.part_states[part as usize];
+        let state = &around.table.part_states[part as usize];
         (state.velocity_at(&first.point), state.angular_velocity)
     };
     let is_tile = |tile: &Entry| {
         let touches = |e: &Entry| ((turn * e.point).z - height).abs() <= tolerance;
-        let is_near = entries.iter().any(|e| e.other == tile.other && touches(e));
+        let is_near = entries.iter().any(|e| e.side() == tile.side() && touches(e));
         let is_level = || {
-            let pose = turn * around.part_states[tile.other as usize].pose;
-            // contacts with a compound name one of its shapes
-            let single = around.shape(tile.other).filter(|shape| !matches!(shape, Shape::Compound(_)));
-            let top = single.map(|shape| shape.tight_aabb(&pose).max.z);
+            // contacts with a compound inside a compound name the outer part
+            let single = around.single(tile.side()).filter(|(shape, _)| !matches!(shape, Shape::Compound(_)));
+            let top = single.map(|(shape, pose)| shape.tight_aabb(&(turn * pose)).max.z);
             top.is_some_and(|top| (top - height).abs() <= FLUSH * LIFT * tolerance)
         };
         is_near
-            && around.is_plain(tile.other)
+            && around.has_two_sides(tile.other)
             && is_a(tile, constraints) == is_a(first, constraints)
-            && velocity(tile.other) == velocity(first.other)
+            && (tile.surface.is_some() || velocity(tile.other) == velocity(first.other))
             && is_level()
     };
     let mut tiles: Vec<Entry> = nearest.iter().filter(|tile| is_tile(tile)).copied().collect();
-    if !tiles.iter().any(|tile| tile.other == first.other) {
+    if !tiles.iter().any(|tile| tile.side() == first.side()) {
         tiles.clear();
     }
     tiles
@@ -122,11 +134,13 @@ fn contacts(
     constraints: &[ContactConstraint],
 ) -> Option<Vec<ContactConstraint>> {
     let (tolerance, is_a) = (around.drift_tolerance, is_a(first, constraints));
-    let plane = Arc::new(FacePlane { state: around.plane_state(first), is_a });
+    let in_world = Pose::from_parts(first.point.into(), to_z(&first.normal).inverse());
+    let pose = around.table.part_states[first.other as usize].pose.inv_mul(&in_world);
+    let plane = Arc::new(FacePlane { carrier: first.other, pose, is_a });
     let ContactConstraint { a, b, .. } = constraints[first.contact as usize];
-    let pair = moving_pair(around.objects, around.owners, around.part_states, [a, b], Some(&plane))?;
+    let pair = moving_pair(around.table, [a, b], Some(&plane))?;
     let mover = if is_a { b } else { a };
-    if !around.is_plain(mover) {
+    if !around.is_uniform(mover) {
         return None;
     }
     let mut found = Vec::new();
@@ -135,12 +149,13 @@ fn contacts(
     if found.is_empty() || found.iter().any(|contact| contact.gap < -LIFT * tolerance) {
         return None;
     }
-    let on_tile = |contact: &tumble_collide::Contact| {
+    let on_tile = |contact: &Contact| {
         let away = if is_a { 0.5 } else { -0.5 } * contact.gap;
         let point = contact.point + away * contact.normal;
         let tile = tiles.iter().find(|tile| around.closest(tile.side(), &point, tolerance).is_some())?;
         let mut constraint = constraints[tile.contact as usize].clone();
         constraint.contact = *contact;
+        constraint.contact.shapes[plane.side()] = tile.other_shape;
         constraint.key.feature = contact.feature;
         constraint.moved = Moved::default();
         constraint.frame = constraint.frame_at(contact.point, contact.normal);
@@ -151,29 +166,28 @@ fn contacts(
 }
 
 impl Surroundings<'_> {
-    /// Returns whether a part has one surface that collides on all sides by its shape.
-    fn is_plain(&self, part: u32) -> bool {
-        let owner = &self.owners[part as usize];
-        let part = owner.part as usize;
-        self.objects.at(owner.place as usize).object.collidable().is_some_and(|body| {
-            body.shape_materials(part).is_empty()
-                && body.shape_filters(part).is_empty()
-                && body.one_way(part).is_none()
-                && body.intersect(part).is_none()
-        })
+    /// Returns a contact with point and normal of the face that it touches, if its normal is nearly that of the face.
+    fn on_face(&self, entry: &Entry) -> Entry {
+        let face = self.closest(entry.side(), &entry.point, self.drift_tolerance);
+        let level = |normal: &Vec3| (normal - entry.normal).norm_squared() < LEVEL * LEVEL;
+        match face.filter(|face| level(&face.normal)) {
+            Some(face) => Entry { point: face.point, normal: face.normal, ..*entry },
+            None => *entry,
+        }
     }
 
-    /// Returns the state of the plane of a contact; it moves with the part that is touched.
-    fn plane_state(&self, first: &Entry) -> PartState {
-        let tile = &self.part_states[first.other as usize];
-        let arm = first.point - tile.position();
-        let velocity = tile.velocity_at(&first.point);
-        PartState {
-            pose: Pose::from_parts(first.point.into(), to_z(&first.normal).inverse()),
-            velocity,
-            acceleration: tile.acceleration_following(&first.point, &velocity),
-            bias_acceleration: tile.bias_acceleration + tile.bias_angular_acceleration.cross(&arm),
-            ..*tile
-        }
+    /// Returns whether a part collides on all sides by its shapes.
+    fn has_two_sides(&self, part: u32) -> bool {
+        let (entry, part) = self.table.entry(part);
+        let sided = |body: &dyn Collidable| body.one_way(part).is_none() && body.intersect(part).is_none();
+        entry.object.collidable().is_some_and(sided)
+    }
+
+    /// Returns whether all shapes of a part have one surface and collide with the same others, on all sides.
+    fn is_uniform(&self, part: u32) -> bool {
+        let uniform = |side: FilteredPart| {
+            side.body.shape_materials(side.part).is_empty() && side.body.shape_filters(side.part).is_empty()
+        };
+        self.has_two_sides(part) && self.table.part(part).is_some_and(uniform)
     }
 }

@@ -27,6 +27,30 @@ pub(crate) struct Owner {
     pub part: u32,
 }
 
+/// The part table at one moment.
+#[derive(Clone, Copy)]
+pub(crate) struct PartTable<'a> {
+    pub objects: Objects<'a>,
+    pub owners: &'a [Owner],
+    pub part_states: &'a [PartState],
+    pub pair_materials: &'a PairMaterials,
+}
+
+impl<'a> PartTable<'a> {
+    /// Returns the object of a row, and the part of it.
+    pub fn entry(&self, row: u32) -> (Entry<'a>, usize) {
+        let owner = &self.owners[row as usize];
+        (self.objects.at(owner.place as usize), owner.part as usize)
+    }
+
+    /// Returns the part of a row; `None` without a shape.
+    pub fn part(&self, row: u32) -> Option<FilteredPart<'a>> {
+        let (entry, part) = self.entry(row);
+        let named = FilteredPart::of(entry.object.collidable()?, part)?;
+        Some(named.named(self.owners[row as usize].id, self.pair_materials))
+    }
+}
+
 /// Minimum number of pairs of a piece of the narrow phase, about 10 µs.
 const PAIRS: usize = 32;
 /// Minimum number of parts of a piece of the bounds, about 10 µs.
@@ -130,11 +154,8 @@ struct BroadPhaseProxy {
 
 /// Inputs and working memory of a detection.
 pub(crate) struct Detector<'a> {
-    pub objects: Objects<'a>,
-    pub owners: &'a [Owner],
-    pub part_states: &'a [PartState],
+    pub table: PartTable<'a>,
     pub settings: &'a Settings,
-    pub pair_materials: &'a PairMaterials,
     pub broad: &'a mut dyn BroadPhase,
     pub scratch: &'a mut DetectorBuffers,
     pub threads: &'a Threads,
@@ -156,11 +177,8 @@ impl Detector<'_> {
         let pieces = if alone { Vec::new() } else { self.threads.pieces(pairs.len(), PAIRS) };
         found.resize_with(pieces.len().max(found.len()).max(1), Found::default);
         let narrow = NarrowPhase {
-            objects: self.objects,
-            owners: self.owners,
-            part_states: self.part_states,
+            table: self.table,
             settings: self.settings,
-            pair_materials: self.pair_materials,
             proxies: &self.scratch.proxies,
             motion_bounds: &self.scratch.motion_bounds,
             near: 2.0 * self.settings.drift_tolerance + reach.distance,
@@ -191,9 +209,7 @@ impl Detector<'_> {
         let (bounds, near) = (&self.scratch.part_bounds, narrow.near);
         let motion = |part: u32| bounds[part as usize].as_ref().map_or(MotionBounds::default(), |bounds| bounds.motion);
         let around = Surroundings {
-            objects: self.objects,
-            owners: self.owners,
-            part_states: self.part_states,
+            table: self.table,
             drift_tolerance: self.settings.drift_tolerance,
             margin: &|a, b| near + motion(a).between(&motion(b), reach.prediction),
         };
@@ -208,7 +224,7 @@ impl Detector<'_> {
         }
         let s = &mut *self.scratch;
         s.place_of_part.clear();
-        s.place_of_part.resize(self.owners.len(), 0);
+        s.place_of_part.resize(self.table.owners.len(), 0);
         s.proxies.clear();
         s.motion_bounds.clear();
         s.gathered.clear();
@@ -242,7 +258,7 @@ impl Detector<'_> {
     /// Moves the boxes of the walked parts; no part has gained or lost its box since the last detection.
     fn move_boxes(&mut self) {
         let s = &mut *self.scratch;
-        for index in self.objects.table.walk.parts.iter().flatten() {
+        for index in self.table.objects.table.walk.parts.iter().flatten() {
             let Some(PartBounds { motion, swept, moving, .. }) = s.part_bounds[index] else { continue };
             let place = s.place_of_part[index] as usize;
             self.broad.set(s.registered[place].handle, &swept, moving);
@@ -253,7 +269,7 @@ impl Detector<'_> {
     /// Computes the bounds of all walked parts: those of settled objects stay. Returns whether any part
     /// has gained or lost its box.
     fn bound_parts(&mut self, reach: Reach) -> bool {
-        let Detector { objects, owners, part_states, settings, threads, .. } = *self;
+        let Detector { table: PartTable { objects, owners, part_states, .. }, settings, threads, .. } = *self;
         let bounds_of = |index: usize| {
             let Owner { place, part, .. } = owners[index];
             let entry = objects.at(place as usize);
@@ -310,11 +326,8 @@ impl Detector<'_> {
 
 /// The narrow phase: constant inputs of all pairs.
 struct NarrowPhase<'a> {
-    objects: Objects<'a>,
-    owners: &'a [Owner],
-    part_states: &'a [PartState],
+    table: PartTable<'a>,
     settings: &'a Settings,
-    pair_materials: &'a PairMaterials,
     /// Rows of the part table, and bounds on their motion.
     proxies: &'a [u32],
     motion_bounds: &'a [MotionBounds],
@@ -332,37 +345,39 @@ impl NarrowPhase<'_> {
     /// Adds the contacts of one pair.
     fn add_pair(&self, pair: [u32; 2], known: &mut KnownContacts, results: &mut Found) {
         let ([a, b], [i, j]) = (self.rows(pair), pair.map(|i| i as usize));
-        let (owner_a, owner_b) = (self.owners[a as usize], self.owners[b as usize]);
-        let [entry_a, entry_b] = [owner_a, owner_b].map(|owner| self.objects.at(owner.place as usize));
-        if !may_collide(&entry_a, owner_a.part as usize, &entry_b, owner_b.part as usize, self.part_states) {
+        let PartTable { owners, part_states, pair_materials, .. } = self.table;
+        let (owner_a, owner_b) = (owners[a as usize], owners[b as usize]);
+        let [(entry_a, part_a), (entry_b, part_b)] = [a, b].map(|row| self.table.entry(row));
+        if !may_collide(&entry_a, part_a, &entry_b, part_b, part_states) {
             return;
         }
         let (Some(body_a), Some(body_b)) = (entry_a.object.collidable(), entry_b.object.collidable()) else { return };
-        let (part_a, part_b) = (owner_a.part as usize, owner_b.part as usize);
         let key = [entry_a.serial, owner_a.part, entry_b.serial, owner_b.part];
         let moves = |entry: &Entry, body: &dyn Collidable, part| entry.moves() && body.part_moves(part);
         let is_known = self.reach.known.binary_search(&key).is_ok();
         if is_known && moves(&entry_a, body_a, part_a) && moves(&entry_b, body_b, part_b) {
             return;
         }
-        let (state_a, state_b) = (&self.part_states[a as usize], &self.part_states[b as usize]);
-        let (Some(shape_a), Some(shape_b)) = (body_a.shape(part_a), body_b.shape(part_b)) else { return };
+        let (state_a, state_b) = (&part_states[a as usize], &part_states[b as usize]);
+        let (Some(side_a), Some(side_b)) = (self.table.part(a), self.table.part(b)) else { return };
+        let filtered = FilteredPart::pair([side_a, side_b]);
         let vary = !body_a.shape_materials(part_a).is_empty() || !body_b.shape_materials(part_b).is_empty();
         let ignored = || {
-            let [of_a, of_b] = [body_a.material(part_a), body_b.material(part_b)];
-            self.pair_materials.ignores((owner_a.id, part_a, &of_a), (owner_b.id, part_b, &of_b))
+            let [of_a, of_b] = [body_a.material(part_a).id, body_b.material(part_b).id];
+            pair_materials.ignores((owner_a.id, part_a, of_a), (owner_b.id, part_b, of_b))
         };
-        if !vary && !self.pair_materials.is_empty() && ignored() {
+        if filtered.is_none() && !pair_materials.is_empty() && ignored() {
             return;
         }
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));
         let pair = PairQuery {
             parts: MovingPair {
                 mode,
-                shapes: [shape_a, shape_b],
+                shapes: [side_a.shape, side_b.shape],
                 tests: OwnTests::of([(entry_a.object, part_a), (entry_b.object, part_b)]),
-                filtered: FilteredPart::pair([(body_a, part_a), (body_b, part_b)]),
+                filtered,
                 part_states: [state_a, state_b],
+                plane: None,
                 skipped: &[],
             },
             motion_bounds: [self.motion_bounds[i], self.motion_bounds[j]],
@@ -380,14 +395,11 @@ impl NarrowPhase<'_> {
         let [of_a, of_b] = [body_a.material(part_a), body_b.material(part_b)];
         let surfaces = PairSurfaces {
             settings: self.settings,
-            pair_materials: self.pair_materials,
+            pair_materials,
             part_states: [state_a, state_b],
             whole: [(owner_a.id, part_a, &of_a), (owner_b.id, part_b, &of_b)],
             of_shapes: [body_a.shape_materials(part_a), body_b.shape_materials(part_b)],
         };
-        if vary {
-            found.retain(|contact| !surfaces.ignores(contact.shapes));
-        }
         let first = out.len();
         if let Some(sleeper) = [entry_a, entry_b].into_iter().find(|e| e.asleep) {
             // the frame will be repeated with it awake

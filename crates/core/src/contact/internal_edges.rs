@@ -1,5 +1,6 @@
-//! Contacts at edges inside a surface that several bodies form together, where it is not one plane below the
-//! whole body (`coplanar.rs`). The bodies that form it do not move; in heaps of moving ones all contacts stay.
+//! Contacts at edges inside a surface that several shapes form together, where it is not one plane below the
+//! whole body (`coplanar.rs`). The shapes are those of bodies that no force moves, or those of one compound or link, which
+//! may move; in heaps of moving bodies all contacts stay.
 //!
 //! The narrow phase knows one pair at a time. For a body `A` on a box `B₁`, the edge of the next
 //! box `B₂` is a corner that sticks out; in the surface of both together it does not exist. A
@@ -22,15 +23,14 @@
 //! keeps its contacts, also those at its foot. So does a ramp of more than 4°, and a step higher than
 //! `flush`.
 //!
-//! Each shape of a compound is a `B` of its own, so the seams inside a compound that does not move are removed likewise. Shapes
-//! may have filters of their own: the nearest contact is one of a shape of `A` with the same filter, so what `A` passes through
-//! hides nothing.
+//! Each shape of a compound is a `B` of its own. A contact of two compounds is seen from both sides: either may be `A`.
+//! Shapes may differ in what they meet, by their filters and by materials that ignore each other: the nearest contact is
+//! one of a shape of `A` that meets the same others, so what `A` passes through hides nothing. Of the contacts of one
+//! place with both sides of a seam one stays.
 
 use crate::contact::coplanar::PlaneContacts;
-use crate::contact::detect::{ContactConstraint, Owner};
-use crate::object::part_state::PartState;
-use crate::object::{FilteredPart, ShapeFilter};
-use crate::world::view::Objects;
+use crate::contact::detect::{ContactConstraint, PartTable};
+use crate::object::{FilteredPart, ShapeClass};
 use tumble_collide::{Pose, Shape, SurfacePoint, Vec3, closest_point_within};
 
 /// Height above the plane at which `B₂` must be absent, in drift tolerances.
@@ -42,7 +42,7 @@ const MAX_OVERHANG: f64 = 2e-3;
 /// Difference of equal normals.
 const SAME_NORMAL: f64 = 1e-7;
 /// Difference of the normals of contacts that support alike.
-const LEVEL: f64 = 1e-3;
+pub(crate) const LEVEL: f64 = 1e-3;
 /// Difference of equal gaps, in drift tolerances.
 const SAME_GAP: f64 = 1e-8;
 /// Maximum number of contacts of a part that are compared; those of a part with more all stay.
@@ -54,7 +54,7 @@ pub(crate) struct InternalEdges {
     /// Start of the entries of each part, and the entries: contacts of a moving part.
     starts: Vec<u32>,
     entries: Vec<Entry>,
-    /// The nearest contact with each other shape, of the shapes with each filter.
+    /// The nearest contact with each other shape, of the shapes of each class.
     nearest: Vec<Entry>,
     /// The contacts of a part, nearest first.
     order: Vec<Entry>,
@@ -71,10 +71,13 @@ pub(crate) type Side = [u32; 2];
 #[derive(Clone, Copy)]
 pub(crate) struct Entry {
     pub contact: u32,
-    /// The filter of the shape of `A`; `None` for that of the body.
-    pub filter: Option<ShapeFilter>,
+    /// The class of the shape of `A`; `None` if its shapes do not differ.
+    pub class: Option<ShapeClass>,
     /// The row of the other part.
     pub other: u32,
+    /// The row of the part that carries the other part, if forces move it: the shapes that it carries form one surface,
+    /// and so do those of all parts that no force moves.
+    pub surface: Option<u32>,
     /// Its shape.
     pub other_shape: u32,
     pub gap: f64,
@@ -91,7 +94,7 @@ impl Entry {
         let (sign, other) = if second { (-1.0, constraint.a) } else { (1.0, constraint.b) };
         let (normal, other_shape) = (sign * c.normal, c.shapes[usize::from(!second)]);
         let point = c.point - normal * (0.5 * c.gap);
-        Entry { contact, filter: None, other, other_shape, gap: c.gap, normal, point }
+        Entry { contact, class: None, other, surface: None, other_shape, gap: c.gap, normal, point }
     }
 
     /// Returns the other shape.
@@ -102,9 +105,7 @@ impl Entry {
 
 /// Inputs of the search.
 pub(crate) struct Surroundings<'a> {
-    pub objects: Objects<'a>,
-    pub owners: &'a [Owner],
-    pub part_states: &'a [PartState],
+    pub table: PartTable<'a>,
     /// m.
     pub drift_tolerance: f64,
     /// Returns the margin of contacts of two parts, m.
@@ -112,29 +113,36 @@ pub(crate) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    fn part(&self, part: u32) -> Option<FilteredPart<'_>> {
-        let owner = &self.owners[part as usize];
-        FilteredPart::of(self.objects.at(owner.place as usize).object.collidable()?, owner.part as usize)
-    }
-
-    /// Returns the shape of a part.
-    pub fn shape(&self, part: u32) -> Option<&Shape> {
-        Some(self.part(part)?.shape)
-    }
-
     /// Returns one shape of a part, at its pose.
-    fn single(&self, [part, shape]: Side) -> Option<(&Shape, Pose)> {
-        let pose = self.part_states[part as usize].pose;
-        match self.shape(part)? {
+    pub fn single(&self, [part, shape]: Side) -> Option<(&Shape, Pose)> {
+        let pose = self.table.part_states[part as usize].pose;
+        match self.table.part(part)?.shape {
             Shape::Compound(compound) => compound.placed().nth(shape as usize).map(|(shape, own)| (shape, pose * own)),
             whole => Some((whole, pose)),
         }
     }
 
     fn moves(&self, part: u32) -> bool {
-        let owner = &self.owners[part as usize];
-        let entry = self.objects.at(owner.place as usize);
-        entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(owner.part as usize))
+        let (entry, part) = self.table.entry(part);
+        entry.moves() && entry.object.collidable().is_some_and(|body| body.part_moves(part))
+    }
+
+    /// Returns the row of the part that carries a moving part, if it may carry several shapes.
+    fn moving_surface(&self, row: u32) -> Option<u32> {
+        let (entry, part) = self.table.entry(row);
+        let body = entry.object.collidable()?;
+        let several = body.parts() > 1 || matches!(body.shape(part), Some(Shape::Compound(_)));
+        several.then(|| row - part as u32 + body.carrier(part) as u32)
+    }
+
+    /// Returns whether all contacts of a part with a moving one may be those with a face of it: it is not larger, or a
+    /// query of its shape is cheap.
+    fn may_stand_on(&self, part: u32, moving: u32) -> bool {
+        let [part, moving] = [part, moving].map(|row| self.table.part(row).map(|part| part.shape));
+        part.zip(moving).is_some_and(|(shape, moving)| {
+            let radius = shape.bounding_radius();
+            radius <= moving.bounding_radius() || radius.is_finite() && !shape.has_tree()
+        })
     }
 
     /// Returns the point of a shape's surface that is closest to a point; `None` if it is more than
@@ -182,91 +190,120 @@ impl InternalEdges {
         self.collect(around, contacts);
         self.removed_by.clear();
         self.removed_by.resize(contacts.len(), None);
-        let mut any = false;
-        for range in self.starts.windows(2) {
-            let entries = &self.entries[range[0] as usize..range[1] as usize];
-            if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.side() == entries[0].side()) {
-                continue;
-            }
-            // contacts are ordered by pair
-            self.nearest.clear();
-            for same in entries.chunk_by(|x, y| x.other == y.other) {
-                let start = self.nearest.len();
-                for entry in same {
-                    let alike = |known: &&mut Entry| known.filter == entry.filter && known.side() == entry.side();
-                    match self.nearest[start..].iter_mut().find(alike) {
-                        Some(known) if known.gap.total_cmp(&entry.gap).is_gt() => *known = *entry,
-                        Some(_) => {}
-                        None => self.nearest.push(*entry),
-                    }
-                }
-            }
-            self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
-            if let Some(plane) = PlaneContacts::find(around, (entries, &self.nearest), contacts) {
-                let replaced = entries.iter().filter(|e| plane.tiles.contains(&e.other));
-                replaced.for_each(|e| self.removed_by[e.contact as usize] = Some(e.side()));
-                self.of_planes.extend(plane.contacts);
-                any = true;
-            }
-            // nearer ones first, so it is known by whom they are removed
-            self.order.clear();
-            self.order.extend_from_slice(entries);
-            self.order.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
-            for c in self.order.iter() {
-                if self.removed_by[c.contact as usize].is_some() {
-                    continue;
-                }
-                let internal = |first: &&Entry| {
-                    let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
-                    let mutual = level && self.removed_by[first.contact as usize] == Some(c.side());
-                    first.side() != c.side() && first.filter == c.filter && !mutual && around.is_internal(c, first)
-                };
-                if let Some(first) = self.nearest.iter().find(internal) {
-                    self.removed_by[c.contact as usize] = Some(first.side());
-                    any = true;
-                }
+        let (starts, mut entries) = (std::mem::take(&mut self.starts), std::mem::take(&mut self.entries));
+        for (part, range) in starts.windows(2).enumerate() {
+            let seen = &mut entries[range[0] as usize..range[1] as usize];
+            seen.sort_by_key(|entry| entry.surface);
+            for surface in seen.chunk_by(|x, y| x.surface == y.surface) {
+                self.look_at(around, contacts, part as u32, surface);
             }
         }
-        if any {
+        (self.starts, self.entries) = (starts, entries);
+        if self.removed_by.iter().any(Option::is_some) {
             let mut removed = self.removed_by.iter();
             contacts.retain(|_| removed.next().is_none_or(Option::is_none));
             if !self.of_planes.is_empty() {
                 contacts.append(&mut self.of_planes);
-                contacts.sort_by_key(|contact| contact.key);
+                contacts.sort_by_key(|contact| (contact.key.pair, contact.plane.is_some(), contact.key.feature));
             }
         }
     }
 
-    /// Collects the contacts of each moving part, by counting.
+    /// Marks the contacts of a part with one surface that are to be removed, and adds those with planes.
+    fn look_at(&mut self, around: &Surroundings, contacts: &[ContactConstraint], part: u32, entries: &[Entry]) {
+        if entries.len() > MAX_CONTACTS || entries.iter().all(|e| e.side() == entries[0].side()) {
+            return;
+        }
+        self.find_nearest(entries);
+        let stands = entries[0].surface.is_none() || around.may_stand_on(part, entries[0].other);
+        let found = stands.then(|| PlaneContacts::find(around, (entries, &self.nearest), contacts)).flatten();
+        if let Some(plane) = found {
+            let replaced = || entries.iter().filter(|e| plane.tiles.contains(&e.side()));
+            // as seen from the other side, they may be contacts of a plane already
+            if replaced().all(|e| self.removed_by[e.contact as usize].is_none()) {
+                replaced().for_each(|e| self.removed_by[e.contact as usize] = Some(e.side()));
+                self.of_planes.extend(plane.contacts);
+            }
+        }
+        // nearer ones first, so it is known by whom they are removed
+        self.order.clear();
+        self.order.extend_from_slice(entries);
+        self.order.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
+        for c in &self.order {
+            if self.removed_by[c.contact as usize].is_some() {
+                continue;
+            }
+            let removed_by = |e: &Entry| self.removed_by[e.contact as usize];
+            let internal = |first: &&Entry| {
+                let level = (c.normal - first.normal).norm_squared() < LEVEL * LEVEL;
+                let mutual = level && removed_by(first) == Some(c.side());
+                first.side() != c.side() && first.class == c.class && !mutual && around.is_internal(c, first)
+            };
+            // the contact of that place with the other shape may be gone, for this one or as seen from the other side
+            let stays = |first: &Entry| {
+                let gone =
+                    |e: &Entry, [by, shape]: Side| by == part || e.side() == first.side() && [by, shape] == c.side();
+                let near = |e: &Entry| (c.point - e.point).norm_squared() <= around.drift_tolerance.powi(2);
+                entries.iter().any(|e| removed_by(e).is_some_and(|by| gone(e, by)) && near(e))
+            };
+            let first = self.nearest.iter().find(|first| internal(first) && !stays(first));
+            if let Some(by) = first.map(Entry::side) {
+                self.removed_by[c.contact as usize] = Some(by);
+            }
+        }
+    }
+
+    /// Finds the nearest contact with each other shape, of the shapes of each class.
+    fn find_nearest(&mut self, entries: &[Entry]) {
+        self.nearest.clear();
+        // contacts are ordered by pair
+        for same in entries.chunk_by(|x, y| x.other == y.other) {
+            let start = self.nearest.len();
+            for entry in same {
+                let alike = |known: &&mut Entry| known.class == entry.class && known.side() == entry.side();
+                match self.nearest[start..].iter_mut().find(alike) {
+                    Some(known) if known.gap.total_cmp(&entry.gap).is_gt() => *known = *entry,
+                    Some(_) => {}
+                    None => self.nearest.push(*entry),
+                }
+            }
+        }
+        self.nearest.sort_by(|x, y| x.gap.total_cmp(&y.gap).then(x.contact.cmp(&y.contact)));
+    }
+
+    /// Collects the contacts as each part sees them, by counting.
     fn collect(&mut self, around: &Surroundings, contacts: &[ContactConstraint]) {
-        // the moving part of a contact with one that does not move
+        // the parts that see a contact, as its first or second one, and the surface
         let seen = |index: usize| {
             let constraint = &contacts[index];
             // the contacts of followed meshes belong to later poses
             let present = constraint.offset == Vec3::zeros();
-            let (a, b) = (constraint.a, constraint.b);
-            match (present && around.moves(a), present && around.moves(b)) {
-                (true, false) => Some((a, false)),
-                (false, true) => Some((b, true)),
-                _ => None,
-            }
+            let parts = [constraint.a, constraint.b];
+            let moves = parts.map(|part| present && around.moves(part));
+            [0, 1].map(|k| {
+                let surface = moves[1 - k].then(|| around.moving_surface(parts[1 - k]));
+                let sees = surface.map_or(moves[k], |moving| moving.is_some());
+                sees.then_some((parts[k], k == 1, surface.flatten()))
+            })
         };
+        let parts = around.table.owners.len();
         self.starts.clear();
-        self.starts.resize(around.owners.len() + 1, 0);
-        for (part, _) in (0..contacts.len()).filter_map(seen) {
+        self.starts.resize(parts + 1, 0);
+        for (part, ..) in (0..contacts.len()).flat_map(seen).flatten() {
             self.starts[part as usize] += 1;
         }
         // to the ends of the ranges
         let mut end = 0;
-        for start in &mut self.starts[..around.owners.len()] {
+        for start in &mut self.starts[..parts] {
             end += *start;
             *start = end;
         }
-        self.starts[around.owners.len()] = end;
+        self.starts[parts] = end;
         let empty = Entry {
             contact: 0,
-            filter: None,
+            class: None,
             other: 0,
+            surface: None,
             other_shape: 0,
             gap: 0.0,
             normal: Vec3::zeros(),
@@ -276,12 +313,13 @@ impl InternalEdges {
         self.entries.resize(end as usize, empty);
         // and from the last contact back to their starts
         for index in (0..contacts.len()).rev() {
-            if let Some((part, second)) = seen(index) {
+            for (part, second, surface) in seen(index).into_iter().flatten() {
                 self.starts[part as usize] -= 1;
-                let mut entry = Entry::new(index as u32, &contacts[index], second);
+                let entry = Entry::new(index as u32, &contacts[index], second);
                 let shape = contacts[index].contact.shapes[usize::from(second)];
-                entry.filter = around.part(part).and_then(|part| part.filter_of(shape));
-                self.entries[self.starts[part as usize] as usize] = entry;
+                let differing = around.table.part(part).filter(FilteredPart::differs);
+                let class = differing.map(|part| part.class_of(shape));
+                self.entries[self.starts[part as usize] as usize] = Entry { class, surface, ..entry };
             }
         }
     }

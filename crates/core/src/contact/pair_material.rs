@@ -57,11 +57,15 @@ impl PairMaterial {
 
 /// A part that is in contact, with its material.
 pub(crate) type Surface<'a> = (ObjectId, usize, &'a Material);
+/// A part, with [`Material::id`] of one of its shapes.
+pub(crate) type SurfaceName = (ObjectId, usize, u32);
 
 /// The chosen pairs of a world. Which side is named first makes no difference.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PairMaterials {
     entries: BTreeMap<[PairSide; 2], PairMaterial>,
+    /// Whether an entry that names a material decides whether its sides collide.
+    select_by_material: bool,
 }
 
 impl PairMaterials {
@@ -72,6 +76,19 @@ impl PairMaterials {
             true => self.entries.remove(&sides),
             false => self.entries.insert(sides, material),
         };
+        self.update();
+    }
+
+    fn update(&mut self) {
+        let decides = |(sides, material): (&[PairSide; 2], &PairMaterial)| {
+            material.collides.is_some() && sides.iter().any(|side| matches!(side, PairSide::Material(_)))
+        };
+        self.select_by_material = self.entries.iter().any(decides);
+    }
+
+    /// Returns whether shapes of one part may differ in what they ignore, by their materials.
+    pub fn select_by_material(&self) -> bool {
+        self.select_by_material
     }
 
     /// Returns all chosen pairs, in the order of their keys.
@@ -83,12 +100,14 @@ impl PairMaterials {
     pub fn forget(&mut self, id: ObjectId) {
         let of = |side: &PairSide| matches!(side, PairSide::Part(other, _) | PairSide::Object(other) if *other == id);
         self.entries.retain(|sides, _| !sides.iter().any(of));
+        self.update();
     }
 
     /// Returns the constants of a contact of two parts, `a` the one that was added first: for each
     /// constant the entry that names the pair most closely, or else the combination rule.
     pub fn combine(&self, settings: &Settings, a: Surface, b: Surface) -> Material {
-        let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(a, b) };
+        let name = |(id, part, material): Surface| (id, part, material.id);
+        let chosen = if self.entries.is_empty() { PairMaterial::default() } else { self.of(name(a), name(b)) };
         let rule = |combine: crate::Combine, of: fn(&Material) -> f64| combine.of(of(a.2), of(b.2));
         let larger = |of: fn(&Material) -> f64| of(a.2).max(of(b.2));
         let at_rest = || rule(settings.combine_friction, Material::friction_at_rest);
@@ -105,8 +124,8 @@ impl PairMaterials {
         }
     }
 
-    /// Returns whether a chosen pair keeps two parts from colliding.
-    pub fn ignores(&self, a: Surface, b: Surface) -> bool {
+    /// Returns whether a chosen pair keeps two surfaces from colliding.
+    pub fn ignores(&self, a: SurfaceName, b: SurfaceName) -> bool {
         !self.is_empty() && self.of(a, b).collides == Some(false)
     }
 
@@ -117,8 +136,10 @@ impl PairMaterials {
 
     /// A part goes before its object, and that before its material; between entries that name a
     /// pair equally closely the one that names `a` more closely decides.
-    fn of(&self, a: Surface, b: Surface) -> PairMaterial {
-        let sides = |(id, part, m): Surface| [PairSide::Part(id, part), PairSide::Object(id), PairSide::Material(m.id)];
+    fn of(&self, a: SurfaceName, b: SurfaceName) -> PairMaterial {
+        let sides = |(id, part, material): SurfaceName| {
+            [PairSide::Part(id, part), PairSide::Object(id), PairSide::Material(material)]
+        };
         let (a, b) = (sides(a), sides(b));
         const BY_CLOSENESS: [(usize, usize); 9] =
             [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0), (1, 2), (2, 1), (2, 2)];

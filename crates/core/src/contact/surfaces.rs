@@ -28,12 +28,6 @@ pub(crate) struct SurfaceLaws {
 }
 
 impl<'a> PairSurfaces<'a> {
-    /// Returns whether a chosen pair keeps two shapes from colliding.
-    pub fn ignores(&self, shapes: [u32; 2]) -> bool {
-        let [a, b] = self.at(shapes);
-        self.pair_materials.ignores(a, b)
-    }
-
     /// Returns the constants of a contact of two shapes.
     pub fn laws(&self, shapes: [u32; 2]) -> SurfaceLaws {
         let ([a, b], [state_a, state_b]) = (self.at(shapes), self.part_states);

@@ -23,15 +23,13 @@
 //! no advance overshoots. Another part of a mesh may come first, so meshes advance by the bound.
 
 use super::coplanar::{FacePlane, HALF_SPACE};
-use super::detect::{ContactConstraint, Owner};
+use super::detect::{ContactConstraint, PartTable};
 use super::own_tests::OwnTests;
 use crate::object::FilteredPart;
-use crate::object::collidable::Collidable;
 use crate::object::part_state::PartState;
 use crate::rigid::rotation::turn;
 use crate::settings::Settings;
 use crate::threads::Threads;
-use crate::world::view::Objects;
 use nalgebra::Translation3;
 use std::sync::Arc;
 use tumble_collide::{Contact, ContactMode, NormalFrom, Pose, Shape, Vec3};
@@ -76,6 +74,8 @@ pub(crate) struct MovingPair<'a> {
     /// The parts, if shapes of them have filters of their own.
     pub filtered: Option<[FilteredPart<'a>; 2]>,
     pub part_states: [&'a PartState; 2],
+    /// The side that is a plane, and its pose in the frame of the part that carries it.
+    pub plane: Option<(usize, Pose)>,
     /// Features of contacts that are not found.
     pub skipped: &'a [u64],
 }
@@ -108,9 +108,13 @@ impl MovingPair<'_> {
         self.contacts_at(&self.part_states.map(|part_state| pose_after_free_motion(part_state, t)), margin, found);
     }
 
-    /// Finds the contacts at two poses, ordered by feature.
+    /// Finds the contacts at two poses of the parts, ordered by feature.
     pub fn contacts_at(&self, poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) {
         found.clear();
+        let mut poses = *poses;
+        if let Some((side, pose)) = &self.plane {
+            poses[*side] *= pose;
+        }
         match self.filtered {
             None => self.tests.contacts(self.mode, self.shapes, poses.each_ref(), margin, found),
             Some([a, b]) => {
@@ -237,47 +241,39 @@ fn is_at_edge(contact: &Contact) -> bool {
 /// Returns two parts, one of them as the `plane` that it forms with others if there is one; `None` if one has
 /// no shape.
 pub(crate) fn moving_pair<'a>(
-    objects: Objects<'a>,
-    owners: &[Owner],
-    part_states: &'a [PartState],
+    table: PartTable<'a>,
     [a, b]: [u32; 2],
     plane: Option<&'a FacePlane>,
 ) -> Option<MovingPair<'a>> {
-    let part = |index: u32| {
-        let owner = owners[index as usize];
-        let (object, part) = (objects.at(owner.place as usize).object, owner.part as usize);
-        let body: &dyn Collidable = object.collidable()?;
-        Some((body.shape(part)?, body.contact_mode(part), (object, part), (body, part)))
-    };
-    let ((shape_a, mode_a, side_a, part_a), (shape_b, mode_b, side_b, part_b)) = part(a).zip(part(b))?;
-    let mut part_states = [a, b].map(|index| &part_states[index as usize]);
-    let mut shapes = [shape_a, shape_b];
+    let sides = [table.part(a)?, table.part(b)?];
+    let mut states = [a, b].map(|row| &table.part_states[row as usize]);
+    let mut shapes = sides.map(|side| side.shape);
     if let Some(plane) = plane {
-        let side = usize::from(!plane.is_a);
-        (shapes[side], part_states[side]) = (&HALF_SPACE, &plane.state);
+        let side = plane.side();
+        (shapes[side], states[side]) = (&HALF_SPACE, &table.part_states[plane.carrier as usize]);
     }
+    let [mode_a, mode_b] = sides.map(|side| side.body.contact_mode(side.part));
     Some(MovingPair {
         mode: mode_a.of_pair(mode_b),
         shapes,
-        tests: OwnTests::of([side_a, side_b]),
-        // parts with filters form no planes
-        filtered: FilteredPart::pair([part_a, part_b]).filter(|_| plane.is_none()),
-        part_states,
+        tests: OwnTests::of([a, b].map(|row| {
+            let (entry, part) = table.entry(row);
+            (entry.object, part)
+        })),
+        // the shapes of a plane all meet the other part
+        filtered: FilteredPart::pair(sides).filter(|_| plane.is_none()),
+        part_states: states,
+        plane: plane.map(|plane| (plane.side(), plane.pose)),
         skipped: &[],
     })
 }
 
 /// Returns the pair of a contact, and the number of samples of its motion in `h` seconds, if it is fast.
-fn fast_pair<'a>(
-    objects: Objects<'a>,
-    (owners, part_states): (&[Owner], &'a [PartState]),
-    h: f64,
-    contact: &'a ContactConstraint,
-) -> Option<(MovingPair<'a>, f64)> {
+fn fast_pair<'a>(table: PartTable<'a>, h: f64, contact: &'a ContactConstraint) -> Option<(MovingPair<'a>, f64)> {
     let sides = [contact.a, contact.b];
-    let states = sides.map(|index| &part_states[index as usize]);
+    let states = sides.map(|index| &table.part_states[index as usize]);
     let motion = h * (states[0].velocity - states[1].velocity).norm();
-    let pair = moving_pair(objects, owners, part_states, sides, contact.plane.as_deref())?;
+    let pair = moving_pair(table, sides, contact.plane.as_deref())?;
     let short = SHORT_MOTION * pair.size();
     // contacts of a mesh begin and end with its features; a surface of an own test need not be convex
     let timed = motion >= short && pair.is_convex() && !pair.tests.any();
@@ -288,15 +284,13 @@ fn fast_pair<'a>(
 /// the parts meet: the first contact, and the others of that place that may follow it in the rest
 /// of the step. Removes contacts that do not close on the way. `predicted` is working memory.
 pub(crate) fn time_contacts(
-    objects: Objects,
-    (owners, part_states): (&[Owner], &[PartState]),
+    table: PartTable,
     (settings, threads): (&Settings, &Threads),
     h: f64,
     contact_constraints: &mut Vec<ContactConstraint>,
     predicted: &mut Vec<ContactConstraint>,
 ) {
-    let parts = (owners, part_states);
-    let is_slow = |contact: &ContactConstraint| fast_pair(objects, parts, h, contact).is_none();
+    let is_slow = |contact: &ContactConstraint| fast_pair(table, h, contact).is_none();
     let slow = contact_constraints.chunk_by(same_surfaces).take_while(|contacts| is_slow(&contacts[0]));
     let slow: usize = slow.map(<[ContactConstraint]>::len).sum();
     predicted.clear();
@@ -312,7 +306,7 @@ pub(crate) fn time_contacts(
     threads.each(pieces.iter_mut(), |(piece, out)| {
         let mut found = Vec::new();
         for contacts in piece.chunk_by(same_surfaces) {
-            match fast_pair(objects, parts, h, &contacts[0]) {
+            match fast_pair(table, h, &contacts[0]) {
                 Some((pair, samples)) => {
                     pair.time_contacts(contacts, (h, settings.drift_tolerance, samples), &mut found, out);
                 }
@@ -326,8 +320,11 @@ pub(crate) fn time_contacts(
 
 /// Returns whether two contacts are of the same parts, or of a part and the same plane.
 fn same_surfaces(x: &ContactConstraint, y: &ContactConstraint) -> bool {
-    let same_plane = || x.plane.as_ref().zip(y.plane.as_ref()).is_some_and(|(x, y)| Arc::ptr_eq(x, y));
-    x.key.pair == y.key.pair || same_plane()
+    match (&x.plane, &y.plane) {
+        (None, None) => x.key.pair == y.key.pair,
+        (Some(x), Some(y)) => Arc::ptr_eq(x, y),
+        _ => false,
+    }
 }
 
 /// Returns pieces of the contacts; no pair is divided.
@@ -453,7 +450,11 @@ impl ContactConstraint {
     /// `move_b`, m, and not turned.
     pub fn place_at(&mut self, contact: &Contact, [move_a, move_b]: [Vec3; 2], t: f64) {
         let closed = contact.normal.dot(&(move_a - move_b));
-        self.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, ..*contact };
+        let mut shapes = contact.shapes;
+        if let Some(plane) = &self.plane {
+            shapes[plane.side()] = self.contact.shapes[plane.side()];
+        }
+        self.contact = Contact { point: contact.point - move_a, gap: contact.gap - closed, shapes, ..*contact };
         self.key.feature = contact.feature;
         self.offset = move_a - move_b;
         self.found_at = t;

@@ -114,6 +114,11 @@ pub trait Collidable {
         let _ = part;
         true
     }
+    /// Returns the part with which a part moves as one: the same for all parts of a link. Their surfaces are one surface
+    /// to others, without edges between them. The part itself by default.
+    fn carrier(&self, part: usize) -> usize {
+        part
+    }
     /// Returns whether two parts of this same object collide.
     fn parts_collide(&self, part_a: usize, part_b: usize) -> bool {
         let _ = (part_a, part_b);

@@ -36,7 +36,7 @@ pub use intersect::Intersect;
 pub use material::{Combine, Material};
 pub use mounts::{CameraCarrier, LightCarrier};
 pub use net_sync::{NetSync, SyncError};
-pub(crate) use shape_filters::{FilterClass, FilteredPart, has_sensor};
+pub(crate) use shape_filters::{FilterClass, FilteredPart, ShapeClass, has_sensor};
 pub use shape_filters::{ShapeFilter, ShapeFilters, shape_meeting};
 pub use shape_materials::ShapeMaterials;
 pub use visual::Renderable;

@@ -1,6 +1,9 @@
-//! Collision groups, masks and sensors of single shapes of a part.
+//! Collision groups, masks and sensors of single shapes of a part, and which shapes of two parts meet: by these, and by the
+//! pairs of parts and materials that ignore each other.
 
 use super::collidable::{Collidable, CollisionGroup};
+use crate::contact::pair_material::PairMaterials;
+use crate::world::view::ObjectId;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use tumble_collide::{CompoundShape, Contact, Pose, Shape};
@@ -47,39 +50,20 @@ impl ShapeFilters {
     }
 }
 
-/// The shapes of a part that have one filter: those of the body for `None`.
-pub(crate) struct FilterClass {
+/// Properties that decide which shapes of other parts a shape meets.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct ShapeClass {
+    /// `None` for the filter of the body.
     filter: Option<ShapeFilter>,
-    /// Indices of the parts of the compound, ascending.
-    parts: Vec<u32>,
+    /// [`Material::id`](crate::Material::id) of the shape, where materials decide.
+    material: u32,
 }
 
-impl FilterClass {
-    /// Returns the classes of a part with a compound whose shapes have filters, in the order of their first shapes.
-    fn of(body: &dyn Collidable, part: usize, compound: &CompoundShape) -> Vec<FilterClass> {
-        let own = body.shape_filters(part);
-        let mut classes: Vec<FilterClass> = Vec::new();
-        for n in 0..compound.parts().len() {
-            let filter = own.iter().find(|(shape, _)| *shape == n).map(|(_, filter)| *filter);
-            match classes.iter_mut().find(|class| class.filter == filter) {
-                Some(class) => class.parts.push(n as u32),
-                None => classes.push(FilterClass { filter, parts: vec![n as u32] }),
-            }
-        }
-        classes
-    }
-
-    fn is_sensor(&self, body: &dyn Collidable, part: usize) -> bool {
-        self.filter.map_or_else(|| body.is_sensor(part), |filter| filter.sensor)
-    }
-
-    fn group(&self, body: &dyn Collidable, part: usize) -> CollisionGroup {
-        self.filter.map_or_else(|| body.collision_group(part), |filter| filter.group)
-    }
-
-    fn collides_with(&self, body: &dyn Collidable, part: usize, group: CollisionGroup) -> bool {
-        self.filter.map_or_else(|| body.collides_with(part, group), |filter| filter.mask & group.bit() != 0)
-    }
+/// The shapes of a part that have one class.
+pub(crate) struct FilterClass {
+    class: ShapeClass,
+    /// Indices of the parts of the compound, ascending.
+    parts: Vec<u32>,
 }
 
 /// A part of an object in a search for pairs.
@@ -88,40 +72,94 @@ pub(crate) struct FilteredPart<'a> {
     pub body: &'a dyn Collidable,
     pub part: usize,
     pub shape: &'a Shape,
+    /// The object, and the pairs of its world that ignore each other; `None` to leave these out.
+    pairs: Option<(ObjectId, &'a PairMaterials)>,
 }
 
 impl<'a> FilteredPart<'a> {
     /// Returns the part; `None` without a shape.
     pub fn of(body: &'a dyn Collidable, part: usize) -> Option<FilteredPart<'a>> {
-        Some(FilteredPart { body, part, shape: body.shape(part)? })
+        Some(FilteredPart { body, part, shape: body.shape(part)?, pairs: None })
     }
 
-    /// Returns the classes of its shapes; `None` if all have the filter of the body.
+    /// Returns the part as one of an object of a world with chosen pairs.
+    pub fn named(self, id: ObjectId, pairs: &'a PairMaterials) -> FilteredPart<'a> {
+        FilteredPart { pairs: Some((id, pairs)), ..self }
+    }
+
+    /// Returns whether its shapes may differ in what they meet.
+    pub fn differs(&self) -> bool {
+        let by_material = || self.by_material() && !self.body.shape_materials(self.part).is_empty();
+        !self.body.shape_filters(self.part).is_empty() || by_material()
+    }
+
+    fn by_material(&self) -> bool {
+        self.pairs.is_some_and(|(_, pairs)| pairs.select_by_material())
+    }
+
+    /// Returns two parts if shapes of one of them may differ in what they meet; `None` for nearly all pairs.
+    pub fn pair(sides: [FilteredPart<'a>; 2]) -> Option<[FilteredPart<'a>; 2]> {
+        sides.iter().any(FilteredPart::differs).then_some(sides)
+    }
+
+    /// Returns the classes of its shapes, in the order of their first shapes; `None` if they do not differ.
     fn classes(&self) -> Option<(&'a CompoundShape, Vec<FilterClass>)> {
         let Shape::Compound(compound) = self.shape else { return None };
-        let filtered = !self.body.shape_filters(self.part).is_empty();
-        filtered.then(|| (&**compound, FilterClass::of(self.body, self.part, compound)))
+        if !self.differs() {
+            return None;
+        }
+        let mut classes: Vec<FilterClass> = Vec::new();
+        for n in 0..compound.parts().len() as u32 {
+            let class = self.class_of(n);
+            match classes.iter_mut().find(|known| known.class == class) {
+                Some(known) => known.parts.push(n),
+                None => classes.push(FilterClass { class, parts: vec![n] }),
+            }
+        }
+        Some((compound, classes))
     }
 
-    /// Returns two parts if a shape of one of them has a filter of its own; `None` for nearly all pairs.
-    pub fn pair(sides: [(&'a dyn Collidable, usize); 2]) -> Option<[FilteredPart<'a>; 2]> {
-        let filtered = sides.iter().any(|(body, part)| !body.shape_filters(*part).is_empty());
-        let [a, b] = sides.map(|(body, part)| filtered.then(|| FilteredPart::of(body, part)).flatten());
-        Some([a?, b?])
-    }
-
-    /// Returns the filter of one shape; `None` for that of the body.
-    pub fn filter_of(&self, shape: u32) -> Option<ShapeFilter> {
-        let own = self.body.shape_filters(self.part);
-        own.iter().find(|(n, _)| *n == shape as usize).map(|(_, filter)| *filter)
+    /// Returns the class of one of its shapes.
+    pub fn class_of(&self, shape: u32) -> ShapeClass {
+        let filters = self.body.shape_filters(self.part);
+        let filter = filters.iter().find(|(n, _)| *n == shape as usize).map(|(_, filter)| *filter);
+        let materials = self.body.shape_materials(self.part);
+        let own = materials.iter().find(|(n, _)| self.by_material() && *n == shape as usize);
+        ShapeClass { filter, material: own.map_or_else(|| self.body.material(self.part).id, |(_, own)| own.id) }
     }
 
     fn whole(&self) -> FilterClass {
-        FilterClass { filter: None, parts: Vec::new() }
+        let class = ShapeClass { filter: None, material: self.body.material(self.part).id };
+        FilterClass { class, parts: Vec::new() }
     }
 
-    /// Returns the shapes that `admits` selects by whether they are sensors, their group, and the groups that they collide with;
-    /// `None` if there are none.
+    fn is_sensor(&self, class: &FilterClass) -> bool {
+        class.class.filter.map_or_else(|| self.body.is_sensor(self.part), |filter| filter.sensor)
+    }
+
+    fn group(&self, class: &FilterClass) -> CollisionGroup {
+        class.class.filter.map_or_else(|| self.body.collision_group(self.part), |filter| filter.group)
+    }
+
+    fn collides_with(&self, class: &FilterClass, group: CollisionGroup) -> bool {
+        let own = class.class.filter;
+        own.map_or_else(|| self.body.collides_with(self.part, group), |filter| filter.mask & group.bit() != 0)
+    }
+
+    /// Returns whether shapes of a class meet those of a class of another part, sensors or not: by their groups and
+    /// masks, and by the pairs that ignore each other.
+    fn meets(&self, class: &FilterClass, other: &FilteredPart<'_>, theirs: &FilterClass) -> bool {
+        let ignores = || {
+            let ((id, pairs), (other_id, _)) = self.pairs.zip(other.pairs)?;
+            let own = (id, self.part, class.class.material);
+            Some(pairs.ignores(own, (other_id, other.part, theirs.class.material)))
+        };
+        self.collides_with(class, other.group(theirs))
+            && other.collides_with(theirs, self.group(class))
+            && ignores() != Some(true)
+    }
+
+    /// Returns the shapes that `admits` selects; `None` if there are none.
     fn shape_if(&self, admits: impl Fn(&FilterClass) -> bool) -> Option<Cow<'a, Shape>> {
         let Some((compound, classes)) = self.classes() else {
             return admits(&self.whole()).then_some(Cow::Borrowed(self.shape));
@@ -138,100 +176,79 @@ impl<'a> FilteredPart<'a> {
 
     /// Returns its shapes that are no sensors.
     pub fn solid(&self) -> Option<Cow<'a, Shape>> {
-        self.shape_if(|class| !class.is_sensor(self.body, self.part))
+        self.shape_if(|class| !self.is_sensor(class))
     }
 
     /// Returns its shapes that are no sensors and that collide with group `group` while their own group is in `mask`.
     pub fn meeting(&self, group: CollisionGroup, mask: u64) -> Option<Cow<'a, Shape>> {
         self.shape_if(|class| {
-            !class.is_sensor(self.body, self.part)
-                && mask & class.group(self.body, self.part).bit() != 0
-                && class.collides_with(self.body, self.part, group)
+            !self.is_sensor(class) && mask & self.group(class).bit() != 0 && self.collides_with(class, group)
         })
     }
 
     /// Returns its shapes that could have contacts with one of several parts, and that a query of a group with a mask finds.
     pub fn met_by(&self, actors: &[FilteredPart<'_>], group: CollisionGroup, mask: u64) -> Option<Cow<'a, Shape>> {
-        let actors: Vec<(&FilteredPart<'_>, Vec<FilterClass>)> = actors
-            .iter()
-            .map(|actor| (actor, actor.classes().map_or_else(|| vec![actor.whole()], |(_, classes)| classes)))
-            .collect();
+        let actors: Vec<(&FilteredPart<'_>, Vec<FilterClass>)> =
+            actors.iter().map(|actor| (actor, actor.all_classes())).collect();
         self.shape_if(|own| {
-            let of = own.group(self.body, self.part);
             let meets = |(actor, classes): &(&FilteredPart<'_>, Vec<FilterClass>)| {
-                classes.iter().any(|class| {
-                    !class.is_sensor(actor.body, actor.part)
-                        && class.collides_with(actor.body, actor.part, of)
-                        && own.collides_with(self.body, self.part, class.group(actor.body, actor.part))
-                })
+                classes.iter().any(|class| !actor.is_sensor(class) && self.meets(own, actor, class))
             };
-            !own.is_sensor(self.body, self.part)
-                && mask & of.bit() != 0
-                && own.collides_with(self.body, self.part, group)
+            !self.is_sensor(own)
+                && mask & self.group(own).bit() != 0
+                && self.collides_with(own, group)
                 && actors.iter().any(meets)
         })
     }
 
-    /// Returns its sensors: each with its filter as a class, the index of the shape, and the shape.
+    /// Returns its sensors: each with its class, the index of the shape, and the shape.
     pub fn sensors(&self) -> Vec<(FilterClass, u32, Cow<'a, Shape>)> {
         let Some((compound, classes)) = self.classes() else {
-            let sensor = self.body.is_sensor(self.part).then(|| (self.whole(), 0, Cow::Borrowed(self.shape)));
+            let whole = self.whole();
+            let sensor = self.is_sensor(&whole).then_some((whole, 0, Cow::Borrowed(self.shape)));
             return sensor.into_iter().collect();
         };
-        let sensors = classes.into_iter().filter(|class| class.is_sensor(self.body, self.part));
-        let single = |class: FilterClass| {
-            class.parts.into_iter().map(move |n| (FilterClass { filter: class.filter, parts: vec![n] }, n))
-        };
+        let sensors = classes.into_iter().filter(|class| self.is_sensor(class));
+        let single =
+            |of: FilterClass| of.parts.into_iter().map(move |n| (FilterClass { class: of.class, parts: vec![n] }, n));
         sensors
             .flat_map(single)
             .map(|(class, n)| (class, n, Cow::Owned(Shape::Compound(compound.subset(&[n])))))
             .collect()
     }
 
-    /// Returns its solid shapes that collide with those of a class of another part: what a sensor of it reports.
+    /// Returns its solid shapes that meet those of a class of another part: what a sensor of it reports.
     pub fn sensed_by(&self, sensor: &FilteredPart<'_>, class: &FilterClass) -> Option<Cow<'a, Shape>> {
-        let group = class.group(sensor.body, sensor.part);
-        self.shape_if(|own| {
-            !own.is_sensor(self.body, self.part)
-                && own.collides_with(self.body, self.part, group)
-                && class.collides_with(sensor.body, sensor.part, own.group(self.body, self.part))
-        })
+        self.shape_if(|own| !self.is_sensor(own) && self.meets(own, sensor, class))
     }
 
     /// Returns its shapes that have contacts with one shape of another part.
-    pub fn meeting_shape(&self, other: &FilteredPart<'_>, shape: u32) -> Option<Cow<'a, Shape>> {
-        if self.body.shape_filters(self.part).is_empty() && other.body.shape_filters(other.part).is_empty() {
-            return Some(Cow::Borrowed(self.shape));
-        }
-        self.sensed_by(other, &FilterClass { filter: other.filter_of(shape), parts: Vec::new() })
+    fn meeting_shape(&self, other: &FilteredPart<'_>, shape: u32) -> Option<Cow<'a, Shape>> {
+        self.sensed_by(other, &FilterClass { class: other.class_of(shape), parts: Vec::new() })
     }
 
-    /// Returns the shapes of this part and another that have contacts with each other: one pair for nearly all parts, several if both
-    /// have shapes with filters of their own. In each pair all shapes of this part meet all of the other one.
+    fn all_classes(&self) -> Vec<FilterClass> {
+        self.classes().map_or_else(|| vec![self.whole()], |(_, classes)| classes)
+    }
+
+    /// Returns the shapes of this part and another that have contacts with each other: one pair for nearly all parts, several if
+    /// shapes of both differ. In each pair all shapes of this part meet all of the other one.
     pub fn contact_pairs(&self, other: &FilteredPart<'a>) -> Vec<[Cow<'a, Shape>; 2]> {
-        let classes =
-            |side: &FilteredPart<'a>| side.classes().map_or_else(|| vec![side.whole()], |(_, classes)| classes);
-        let (own, theirs) = (classes(self), classes(other));
+        let (own, theirs) = (self.all_classes(), other.all_classes());
         // shapes of this part that meet the same shapes of the other one are one pair
-        type Filters = Vec<Option<ShapeFilter>>;
-        let mut found: Vec<[Filters; 2]> = Vec::new();
-        for class in own.iter().filter(|class| !class.is_sensor(self.body, self.part)) {
-            let group = class.group(self.body, self.part);
-            let meets = |of: &&FilterClass| {
-                !of.is_sensor(other.body, other.part)
-                    && of.collides_with(other.body, other.part, group)
-                    && class.collides_with(self.body, self.part, of.group(other.body, other.part))
-            };
-            let met: Filters = theirs.iter().filter(meets).map(|of| of.filter).collect();
+        let mut found: Vec<[Vec<ShapeClass>; 2]> = Vec::new();
+        for class in own.iter().filter(|class| !self.is_sensor(class)) {
+            let meets = |of: &&FilterClass| !other.is_sensor(of) && self.meets(class, other, of);
+            let met: Vec<ShapeClass> = theirs.iter().filter(meets).map(|of| of.class).collect();
             match found.iter_mut().find(|[_, known]| *known == met) {
-                Some([own, _]) => own.push(class.filter),
+                Some([own, _]) => own.push(class.class),
                 None if met.is_empty() => {}
-                None => found.push([vec![class.filter], met]),
+                None => found.push([vec![class.class], met]),
             }
         }
-        let pair = |[own, met]: [Filters; 2]| {
-            let own = self.shape_if(|class| own.contains(&class.filter))?;
-            Some([own, other.shape_if(|class| met.contains(&class.filter))?])
+        let pair = |[own, met]: [Vec<ShapeClass>; 2]| {
+            let own = self.shape_if(|class| own.contains(&class.class))?;
+            Some([own, other.shape_if(|class| met.contains(&class.class))?])
         };
         found.into_iter().filter_map(pair).collect()
     }

@@ -9,7 +9,7 @@ use super::patch::PatchMoment;
 use super::solves::Solves;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
-use crate::contact::detect::{ContactConstraint, Detector, Owner};
+use crate::contact::detect::{ContactConstraint, Detector, Owner, PartTable};
 use crate::contact::laws::ContactLaws;
 use crate::contact::pair::Reach;
 use crate::derived::{Cache, Derived};
@@ -96,11 +96,13 @@ pub(crate) fn limits(view: &WorldView, out: &mut Vec<Limit>) -> Result<(), StepE
 /// Finds the contacts within reach at `moment`, or else at the present.
 pub(crate) fn detect(core: &mut Core, moment: Option<&Moment>, reach: Reach, out: &mut Vec<ContactConstraint>) {
     let mut detector = Detector {
-        objects: core.table.with(&core.state.objects),
-        owners: &core.owners,
-        part_states: &moment.map_or(&core.derived, |moment| &moment.derived).part_states,
+        table: PartTable {
+            objects: core.table.with(&core.state.objects),
+            owners: &core.owners,
+            part_states: &moment.map_or(&core.derived, |moment| &moment.derived).part_states,
+            pair_materials: &core.pair_materials,
+        },
         settings: &core.settings,
-        pair_materials: &core.pair_materials,
         broad: core.broad.as_mut(),
         scratch: &mut core.detect_scratch,
         threads: &core.threads,

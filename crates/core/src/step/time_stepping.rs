@@ -160,9 +160,8 @@ impl TimeStepping {
     fn advance(&mut self, core: &mut Core, middle: &mut Moment, h: f64) -> Result<(), StepError> {
         self.smooth_forces(core, middle, h)?;
         detect(core, None, Reach::in_time(h, PredictionMode::Each), &mut self.work.contact_constraints);
-        let parts = (&core.owners[..], &core.derived.part_states[..]);
         let (found, predicted) = (&mut self.work.contact_constraints, &mut self.buffers.predicted);
-        time_contacts(core.objects(), parts, (&core.settings, &core.threads), h, found, predicted);
+        time_contacts(core.part_table(), (&core.settings, &core.threads), h, found, predicted);
         moving::move_contacts(core, found, 0.5 * h);
         build_rows(core, Some(&mut *middle), &mut self.work, Level::Velocity { h }, 0.5 * h)?;
         let mut u = std::mem::take(&mut self.work.u);

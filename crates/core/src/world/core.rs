@@ -2,7 +2,7 @@
 
 use super::events::{Event, Touches, Touching};
 use super::state::WorldState;
-use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner};
+use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner, PartTable};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::warm_starts::{RowStart, WarmStart};
 use crate::derived::{Cache, Derived};
@@ -313,6 +313,16 @@ impl Core {
     /// Returns the objects with their switches.
     pub(crate) fn objects(&self) -> Objects<'_> {
         self.table.with(&self.state.objects)
+    }
+
+    /// Returns the part table of the present.
+    pub(crate) fn part_table(&self) -> PartTable<'_> {
+        PartTable {
+            objects: self.objects(),
+            owners: &self.owners,
+            part_states: &self.derived.part_states,
+            pair_materials: &self.pair_materials,
+        }
     }
 
     /// Returns the present state, and the caches of `acting`, or else of the present.

@@ -443,7 +443,9 @@ impl Core {
                 let parts = entry.state_range.parts.clone().enumerate();
                 parts.filter_map(move |(part, row)| {
                     let pose = self.derived.part_states[row].pose;
-                    Some(SensedPart { entry, side: FilteredPart::of(body, part)?, pose })
+                    let id = self.table.order[entry.place];
+                    let side = FilteredPart::of(body, part)?.named(id, &self.pair_materials);
+                    Some(SensedPart { entry, side, pose })
                 })
             })
         };
@@ -490,11 +492,6 @@ impl Core {
         let (FilteredPart { body: a, part: part_a, .. }, FilteredPart { body: b, part: part_b, .. }) =
             (sensor.side, other.side);
         let Some(shape) = other.side.sensed_by(&sensor.side, &trigger.class) else { return false };
-        let [sensor_id, other_id] = [&sensor.entry, &other.entry].map(|entry| self.table.order[entry.place]);
-        let [of_a, of_b] = [a.material(part_a), b.material(part_b)];
-        if self.pair_materials.ignores((sensor_id, part_a, &of_a), (other_id, part_b, &of_b)) {
-            return false;
-        }
         contacts.clear();
         let mode = a.contact_mode(part_a).of_pair(b.contact_mode(part_b));
         let tests = OwnTests::of([(sensor.entry.object, part_a), (other.entry.object, part_b)]);

@@ -67,6 +67,7 @@ mod mesh_frame;
 mod meshes;
 mod mimic;
 mod moving_contact;
+mod moving_edges;
 mod one_sided_limits;
 mod one_way;
 mod open_mesh;

@@ -2,7 +2,7 @@
 
 use tumble_core::collide::{CompoundPart, Pose, Quat, Shape, Vec3};
 use tumble_core::prelude::*;
-use tumble_core::{LockedAxes, ObjectId, PairMaterial, PairSide};
+use tumble_core::{LockedAxes, ObjectId, PairMaterial, PairSide, QueryFilter, Ray};
 
 const G: f64 = 9.81;
 
@@ -146,4 +146,34 @@ fn materials_of_parts_are_checked_archived_and_changed() {
     assert!((world.body(id).unwrap().velocity() - before).xy().norm() < 1e-9);
     let body = world.get::<RigidBody>(id).unwrap();
     assert_eq!((body.shape_material(0), body.shape_material(1).friction), (body.material, 0.0));
+}
+
+/// A material of one shape that another body ignores is ignored in overlaps, by sensors, and by queries as that body.
+#[test]
+fn an_ignored_shape_is_not_found_by_overlaps_sensors_and_queries() {
+    for ignored in [false, true] {
+        let mut world = World::new(Settings::default().with_gravity(Vec3::zeros())).unwrap();
+        let bar = world.add(bar().with_shape_material(1, Material { id: 7, ..Material::default() })).unwrap();
+        let at = |x: f64| Pose::translation(x, 0.0, 0.0);
+        let probe = RigidBody::fixed(Shape::sphere(0.1).unwrap()).with_pose(at(0.55));
+        let probe = world.add_static(probe).unwrap();
+        let gate = RigidBody::fixed(Shape::sphere(0.3).unwrap()).with_pose(at(0.5)).with_sensor(true);
+        let gate = world.add_static(gate).unwrap();
+        if ignored {
+            let apart = PairMaterial { collides: Some(false), ..PairMaterial::default() };
+            for other in [probe, gate] {
+                world.set_pair_material(PairSide::Material(7), PairSide::Object(other), apart).unwrap();
+            }
+        }
+        assert_eq!(world.overlapping_pairs(0.0).len(), usize::from(!ignored));
+        let filter = QueryFilter::default().acting_as(probe);
+        let hit = |x: f64| {
+            let ray = Ray { origin: Vec3::new(x, 0.0, 1.0), direction: -Vec3::z(), max_distance: 2.0 };
+            world.cast_ray(&ray, &filter).map(|hit| hit.id)
+        };
+        assert_eq!([-0.5, 0.5].map(hit), [Some(bar), (!ignored).then_some(bar)]);
+        world.step().unwrap();
+        assert_eq!(world.touching(gate).len(), usize::from(!ignored));
+        assert_eq!(world.contacts().len(), usize::from(!ignored));
+    }
 }

@@ -564,10 +564,11 @@ class RigidBody:
     def locked(self) -> tuple[LockedAxis, ...]:
         """Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
         along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
-        them). Setting it clears the velocity along these axes.
+        them). Setting it takes one name or several, and clears the velocity along
+        these axes.
         """
     @locked.setter
-    def locked(self, value: Sequence[LockedAxis]) -> None: ...
+    def locked(self, value: LockedAxis | Sequence[LockedAxis]) -> None: ...
     @property
     def linear_damping(self) -> float:
         """Linear damping, 1/s, at least 0: a force of ``-damping · momentum``. Without other forces the
@@ -3122,7 +3123,7 @@ class World:
         inertia: ArrayLike | None = None,
         center_of_mass: ArrayLike | None = None,
         gravity_scale: float = 1.0,
-        locked: Sequence[LockedAxis] | None = None,
+        locked: LockedAxis | Sequence[LockedAxis] | None = None,
         non_spinning: bool = False,
         intersect: Intersect | None = None,
         one_way: ArrayLike | None = None,

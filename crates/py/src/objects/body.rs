@@ -94,11 +94,13 @@ pub fn link_inertia(value: &Bound<'_, PyAny>) -> Result<Mat3> {
     Ok(inertia)
 }
 
-/// Converts names of axes.
-pub fn locked(names: &[String]) -> Result<LockedAxes> {
-    LockedAxes::of_names(names.iter().map(String::as_str)).map_err(|wrong| {
-        Error::value(format!("locked: `{wrong}` is not known; there are {}", LockedAxes::NAMES.join(", ")))
-    })
+/// Converts names of axes, or one name.
+pub fn locked(value: &Bound<'_, PyAny>) -> Result<LockedAxes> {
+    let names = value.extract::<String>().map(|name| vec![name]).or_else(|_| value.extract::<Vec<String>>());
+    let all = || LockedAxes::NAMES.join(", ");
+    let names = names.map_err(|_| Error::value(format!("locked: expected names of axes; there are {}", all())))?;
+    LockedAxes::of_names(names.iter().map(String::as_str))
+        .map_err(|wrong| Error::value(format!("locked: `{wrong}` is not known; there are {}", all())))
 }
 
 #[pymethods]
@@ -459,15 +461,16 @@ impl RigidBody {
 
     /// Locked axes of the world: a tuple of ``"x"``, ``"y"``, ``"z"`` (the center of mass does not move
     /// along them), ``"rotation_x"``, ``"rotation_y"``, ``"rotation_z"`` (the body does not turn about
-    /// them). Setting it clears the velocity along these axes.
+    /// them). Setting it takes one name or several, and clears the velocity along
+    /// these axes.
     #[getter]
     fn locked<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyTuple>> {
         Ok(PyTuple::new(py, self.constant(|body| body.locked.names().collect::<Vec<_>>())?)?)
     }
 
     #[setter]
-    fn set_locked(&self, py: Python<'_>, value: Vec<String>) -> Result<()> {
-        let axes = locked(&value)?;
+    fn set_locked(&self, py: Python<'_>, value: &Bound<'_, PyAny>) -> Result<()> {
+        let axes = locked(value)?;
         self.change(py, |body| body.locked = axes)
     }
 

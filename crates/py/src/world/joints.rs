@@ -48,6 +48,9 @@ pub struct Arguments<'a, 'py> {
 
 /// Adds a joint and returns its handle.
 pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> Result<Joint> {
+    if given.kind == "mimic" {
+        return Err(Error::value("kind: `mimic` couples coordinates and is made by World.add_mimic"));
+    }
     let kind = meaning("kind", given.kind, LoopJointKind::NAMES)?;
     let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
     let (a, b) = (a?, b?);

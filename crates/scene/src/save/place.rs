@@ -38,10 +38,15 @@ impl Unfinished {
     pub(crate) fn write(path: &Path, text: &str, files: &[(String, Vec<u8>)]) -> Result<Unfinished, Fault> {
         let name = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
         let (stem, file) = (name(path.file_stem()), name(path.file_name()));
+        let place = path.parent().filter(|place| !place.as_os_str().is_empty());
+        if let Some(place) = place.filter(|place| !place.is_dir()) {
+            let why = format!("there is no folder {}", place.display());
+            return Err(Fault { file: path.to_path_buf(), source: io::Error::new(io::ErrorKind::NotFound, why) });
+        }
         let folder = path.with_file_name(format!(".{stem}.{}.unfinished", std::process::id()));
         // of a process of this number that was killed
         let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir(&folder).map_err(Fault::at(&folder))?;
+        std::fs::create_dir(&folder).map_err(Fault::at(path))?;
         let made = Unfinished { folder, stem, file };
         let beside = made.files();
         if !files.is_empty() {

@@ -50,7 +50,7 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "9637b6c214a4c1e3";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "5a07a31e6f96f3f8";
     bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "177b70cbfeccbaf8";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
     chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";

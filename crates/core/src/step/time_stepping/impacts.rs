@@ -65,7 +65,7 @@ fn may_strike(core: &Core, constraint: &ContactConstraint) -> bool {
 fn stops(core: &Core, constraint: &ContactConstraint, (v, gain): (f64, f64), speed: f64) -> bool {
     let sides = [constraint.a, constraint.b];
     let pair = || {
-        moving_pair(core.objects(), &core.owners, &core.derived.part_states, sides, constraint.plane.as_deref())
+        moving_pair(core.part_table(), sides, constraint.plane.as_deref())
             .is_some_and(|pair| pair.shapes.iter().all(|shape| shape.has_convex_parts()))
     };
     speed > (GRAZING * -v).max(-gain) && pair()

@@ -125,7 +125,7 @@ fn same_query(x: &ContactConstraint, y: &ContactConstraint) -> bool {
 /// convex. `found` is working memory.
 fn find_at_impact(core: &Core, contacts: &mut [ContactConstraint], t: f64, found: &mut Vec<Contact>) -> bool {
     let (sides, plane) = ([contacts[0].a, contacts[0].b], contacts[0].plane.clone());
-    let pair = moving_pair(core.objects(), &core.owners, &core.derived.part_states, sides, plane.as_deref());
+    let pair = moving_pair(core.part_table(), sides, plane.as_deref());
     let stops = contacts.iter().all(|constraint| constraint.restitution <= 0.0);
     let convex = |shape: &Shape| matches!(shape, Shape::Mesh(_)) && shape.has_convex_parts();
     let again = |shape: &&Shape| !shape.has_tree() || stops && convex(shape);

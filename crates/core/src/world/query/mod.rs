@@ -137,15 +137,13 @@ impl World {
         let actors = self.actors(filter);
         found.filter_map(move |part| {
             let own = FilteredPart::of(part.entry.object.collidable()?, part.part)?;
+            let own = own.named(part.id, &self.core.pair_materials);
             let shape = match &actors {
                 None => own.meeting(filter.group, filter.mask)?,
                 Some(actors) => {
-                    let material = own.body.material(part.part);
-                    let meet = actors.iter().filter(|(id, actor)| {
-                        let apart = *id != part.id || own.body.parts_collide(actor.part, part.part);
-                        let of_actor = (*id, actor.part, &actor.body.material(actor.part));
-                        apart && !self.core.pair_materials.ignores(of_actor, (part.id, part.part, &material))
-                    });
+                    let meet = actors
+                        .iter()
+                        .filter(|(id, actor)| *id != part.id || own.body.parts_collide(actor.part, part.part));
                     let meet: Vec<FilteredPart<'_>> = meet.map(|(_, actor)| *actor).collect();
                     own.met_by(&meet, filter.group, filter.mask)?
                 }
@@ -163,7 +161,7 @@ impl World {
         Some(
             parts
                 .filter(|own| parts_of.as_ref().is_none_or(|parts| parts.contains(&own.part)))
-                .map(|own| (id, own))
+                .map(|own| (id, own.named(id, &self.core.pair_materials)))
                 .collect(),
         )
     }

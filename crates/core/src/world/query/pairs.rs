@@ -46,20 +46,17 @@ impl World {
     }
 
     /// Returns the greatest depth of the contacts of two parts that may collide, if they overlap.
-    fn depth_of(&self, a: &Part<'_>, b: &Part<'_>) -> Option<f64> {
+    fn depth_of<'a>(&'a self, a: &Part<'a>, b: &Part<'a>) -> Option<f64> {
         if !may_collide(&a.entry, a.part, &b.entry, b.part, &self.core.derived.part_states) {
-            return None;
-        }
-        let material = |p: &Part<'_>| Some(p.entry.object.collidable()?.material(p.part));
-        let (of_a, of_b) = (material(a)?, material(b)?);
-        if self.core.pair_materials.ignores((a.id, a.part, &of_a), (b.id, b.part, &of_b)) {
             return None;
         }
         let mode = a.mode.of_pair(b.mode);
         let mut found: Vec<Contact> = Vec::new();
         let tests = OwnTests::of([(a.entry.object, a.part), (b.entry.object, b.part)]);
-        let bodies = (a.entry.object.collidable()?, b.entry.object.collidable()?);
-        let (side_a, side_b) = (FilteredPart::of(bodies.0, a.part)?, FilteredPart::of(bodies.1, b.part)?);
+        let side = |p: &Part<'a>| {
+            Some(FilteredPart::of(p.entry.object.collidable()?, p.part)?.named(p.id, &self.core.pair_materials))
+        };
+        let (side_a, side_b) = (side(a)?, side(b)?);
         for [shape_a, shape_b] in side_a.contact_pairs(&side_b) {
             tests.contacts(mode, [&shape_a, &shape_b], [&a.pose, &b.pose], 0.0, &mut found);
         }

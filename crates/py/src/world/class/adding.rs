@@ -68,7 +68,7 @@ impl World {
         inertia: Option<&Bound<'_, PyAny>>,
         center_of_mass: Option<&Bound<'_, PyAny>>,
         gravity_scale: f64,
-        locked: Option<Vec<String>>,
+        locked: Option<&Bound<'_, PyAny>>,
         non_spinning: bool,
         intersect: Option<&Bound<'_, PyAny>>,
         one_way: Option<&Bound<'_, PyAny>>,
@@ -91,7 +91,7 @@ impl World {
             .with_groups(query::group(group)?, query::mask(mask)?)
             .with_sensor(sensor)
             .with_gravity_scale(gravity_scale)
-            .with_locked(body::locked(&locked.unwrap_or_default())?);
+            .with_locked(locked.map(body::locked).transpose()?.unwrap_or_default());
         if non_spinning {
             body = tumble::behaviors::non_spinning(body);
         }
