@@ -187,7 +187,7 @@ impl Finisher {
         whole
     }
 
-    /// Places a picture and returns the whole.
+    /// Places a picture and returns the whole: the picture itself if that is all of it.
     pub fn place(
         &mut self,
         gpu: &Gpu,
@@ -196,10 +196,14 @@ impl Finisher {
         size: [u32; 2],
         placed: &Placed,
     ) -> Result<Texture, RenderError> {
-        let whole = self.whole(gpu, placed.whole_px);
         let plain = placed.is_plain();
+        let covers = plain && (placed.at_px, size) == ([0, 0], placed.whole_px);
+        if covers && rim == 0 {
+            return Ok(from.texture.clone());
+        }
+        let whole = self.whole(gpu, placed.whole_px);
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
-        if placed.begin.is_some() || !plain {
+        if placed.begin.is_some() && !covers || !plain {
             self.pass(gpu, &mut encoder, (&from.view, &whole), (rim, size, placed), None)?;
         }
         if plain {
