@@ -61,8 +61,8 @@ def tumble(*args, timeout=36000):
     return done.stdout
 
 
-def start(*args, **more):
-    return subprocess.Popen([TUMBLE, *map(str, args)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **more)
+def start(*args, stderr=subprocess.DEVNULL, **more):
+    return subprocess.Popen([TUMBLE, *map(str, args)], stderr=stderr, stdout=subprocess.DEVNULL, **more)
 
 
 def end(*processes):
@@ -252,16 +252,23 @@ def bowling(options):
 
 
 def kills(options, name="kills", draw=("--no-pictures",), bound=1.0):
-    """A facet is killed at random times and started again: the others miss nothing, and it is back within 1 s."""
-    folder, rng, back = OUT / name, random.Random(options.seed), []
-    cave = small_cave(name)
-    run = start("cave", "billiards", "--cave", cave, *draw, "--restart", "--log-dir", folder, "--quiet", "--connect-timeout", 60, "--summary", folder.with_suffix(".json"))
+    """A facet is killed at random times and started again: the others miss nothing, and it is back within 1 s. One with a process that stands by is killed
+    when that is ready."""
+    folder, rng, back, waited = OUT / name, random.Random(options.seed), [], []
+    cave, said = small_cave(name), OUT / f"{name}.txt"
+    run = start("cave", "billiards", "--cave", cave, *draw, "--restart", "--log-dir", folder, "--connect-timeout", 60, "--summary", folder.with_suffix(".json"),
+                stderr=said.open("w"))
+    ready = lambda facet: said.read_text().count(f"facet {facet}: another process stands by")
     try:
         wait_for(lambda: all(last_line(folder, facet) and last_line(folder, facet)["frame"] > 20 for facet in FACETS))
         for k in range(options.kills):
             # no facet is started more than 5 times in a minute
             time.sleep(rng.uniform(3.2, 4.2))
             victim = FACETS[k % len(FACETS)]
+            before = time.time()
+            if "--stand-by" in draw:
+                wait_for(lambda: ready(victim) > k // len(FACETS))
+            waited.append(time.time() - before)
             os.kill(facets_of(run.pid)[victim], signal.SIGKILL)
             killed = time.time()
             back.append(shown_after(folder, victim, killed + 0.02) - killed)
@@ -269,7 +276,8 @@ def kills(options, name="kills", draw=("--no-pictures",), bound=1.0):
         [code] = end(run)
     same, summary = same_states(folder), json.loads(folder.with_suffix(".json").read_text())
     wrong = sum(facet["mismatched"] + facet["torn"] for facet in summary["facets"])
-    print(f"{name}: {options.kills} times kill -9 of a facet; back after {spread(back)}; "
+    print(f"{name}: {options.kills} times kill -9 of a facet; back after {spread(back)}"
+          f"{', killed when another process had stood by, which took up to ' + format(max(waited), '.1f') + ' s more' if max(waited) > 0.1 else ''}; "
           f"states {'the same' if same else 'DIFFERENT'}, {wrong} mismatched or torn, exit code {code}", flush=True)
     return same and wrong == 0 and code == 0 and max(back) < bound
 

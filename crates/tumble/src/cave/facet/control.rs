@@ -13,7 +13,7 @@ use tumble::render::CalibrationPattern;
 /// Interval at which signals, parent and picture are polled.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Interval at which a facet that stands by looks for the launcher's line.
-pub const STANDBY_INTERVAL: Duration = Duration::from_millis(5);
+pub const STANDBY_INTERVAL: Duration = Duration::from_millis(20);
 /// Time without a server after which the facet reports it.
 const REPORT_DELAY: Duration = Duration::from_secs(1);
 

@@ -67,6 +67,8 @@ pub struct FacetProcess {
     reports: Option<ReportReader>,
     /// The process that stands by to take the place of this one.
     standby: Option<Started>,
+    /// Whether it has been said that it is ready.
+    standby_announced: bool,
     /// End of the last process that stood by and was not needed.
     standby_ended: Option<Instant>,
     pub ended: Option<Instant>,
@@ -138,6 +140,7 @@ impl FacetProcess {
             began: None,
             reports: None,
             standby: None,
+            standby_announced: false,
             standby_ended: None,
             ended: None,
             over: false,
@@ -194,7 +197,7 @@ impl FacetProcess {
     pub fn start_standby(&mut self) {
         let Some(words) = &self.command_of_standby else { return };
         match self.starter.start(words, self.members.len()) {
-            Ok(started) => self.standby = Some(started),
+            Ok(started) => (self.standby, self.standby_announced) = (Some(started), false),
             Err(e) => {
                 self.standby_ended = Some(Instant::now());
                 eprint!("{}", Failure::run(&format!("starting {} to stand by", self.title()), e).report());
@@ -259,6 +262,14 @@ impl FacetProcess {
     /// Returns whether the process that stands by still prepares.
     pub fn standby_is_preparing(&self) -> bool {
         self.standby.as_ref().is_some_and(|standby| prepares(&standby.reports.received(0), Some(standby.began)))
+    }
+
+    /// Returns whether the process that stands by has become ready since the last call that said so.
+    pub fn standby_is_newly_ready(&mut self) -> bool {
+        let Some(standby) = self.standby.as_ref().filter(|_| !self.standby_announced) else { return false };
+        let received = standby.reports.received(0);
+        self.standby_announced = received.heard.is_some() && !received.report.preparing;
+        self.standby_announced
     }
 
     /// Returns whether the process still writes frames and makes progress.

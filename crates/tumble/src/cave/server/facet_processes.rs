@@ -321,6 +321,9 @@ impl FacetProcesses {
     /// Starts a process that stands by, if one is missing and nothing else prepares: they would take each
     /// other's time.
     fn keep_standbys(&mut self) {
+        let ready =
+            self.processes.iter_mut().filter_map(|process| process.standby_is_newly_ready().then(|| process.title()));
+        ready.collect::<Vec<_>>().iter().for_each(|title| self.report(&format!("{title}: another process stands by")));
         let lacking: Vec<usize> = (0..self.processes.len()).filter(|&k| self.processes[k].lacks_standby()).collect();
         let busy = |process: &FacetProcess| process.is_preparing() || process.standby_is_preparing();
         if let Some(&k) = lacking.first()
