@@ -330,7 +330,7 @@ fn what_cannot_go_well_is_refused_before_the_start() {
     let taken = format!("{spaced}/frames");
     for args in [&["--then", "nowhere.toml"][..], &["--web", "--web-key", &spaced], &["--log-dir", &taken]] {
         let (code, _, wrong) = place.start("cave", args).end();
-        assert_eq!((code, wrong.matches("error").count()), (Some(2), 1), "{wrong}");
+        assert_eq!((code, wrong.matches("error: ").count()), (Some(2), 1), "{wrong}");
         assert!(wrong.contains(args[args.len() - 1]), "{wrong}");
     }
     assert!(Command::new("mkfifo").arg(place.path("key")).status().unwrap().success());

@@ -10,7 +10,7 @@ use rustix::io::ioctl_fionbio;
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::Write;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tumble::net::sync::transport::FacetNumber;
@@ -24,6 +24,10 @@ const LAST_REPORT_TIMEOUT: Duration = Duration::from_millis(50);
 const REPORT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time after the end of a process that stood by in which no other one is started.
 const STANDBY_PAUSE: Duration = Duration::from_secs(60);
+/// Interval at which a process is looked at that may be ending.
+const ENDING_INTERVAL: Duration = Duration::from_millis(50);
+/// Time for killed processes to end. On a busy machine their threads wait for a core.
+const KILL_TIMEOUT: Duration = Duration::from_secs(1);
 /// Exit codes of a facet that failed by itself: the command's own, and that of a panic.
 const OWN_FAILURES: [i32; 3] = [1, 2, 101];
 
@@ -62,6 +66,10 @@ pub struct FacetProcess {
     /// The same of a process that stands by; `None` for none.
     command_of_standby: Option<Vec<OsString>>,
     pub child: Option<Child>,
+    /// Earlier processes that are ending.
+    ending: Vec<Child>,
+    /// When it was last asked whether the process is ending.
+    looked: Option<Instant>,
     /// Start of the process.
     began: Option<Instant>,
     reports: Option<ReportReader>,
@@ -108,10 +116,13 @@ impl Starter {
         }
     }
 
-    /// Ends a process at once.
+    /// Kills a process. One that takes long to end is left to the system.
     fn kill(&self, mut child: Child) {
         let _ = child.kill();
-        let _ = child.wait();
+        let until = Instant::now() + KILL_TIMEOUT;
+        while matches!(child.try_wait(), Ok(None)) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(2));
+        }
         self.signals.ended(child.id());
     }
 }
@@ -137,6 +148,8 @@ impl FacetProcess {
             command_again: command(FacetStart::Again),
             command_of_standby: standby.then(|| command(FacetStart::StandBy)),
             child: None,
+            ending: Vec::new(),
+            looked: None,
             began: None,
             reports: None,
             standby: None,
@@ -215,10 +228,10 @@ impl FacetProcess {
         self.standby.take().into_iter().for_each(|standby| self.starter.kill(standby.child));
     }
 
-    /// Ends both processes at once.
+    /// Ends all its processes at once.
     pub fn kill(&mut self) {
         self.end_standby();
-        self.child.take().into_iter().for_each(|child| self.starter.kill(child));
+        self.child.take().into_iter().chain(self.ending.drain(..)).for_each(|child| self.starter.kill(child));
     }
 
     /// Writes a line into the pipe to the facet. A full pipe takes none.
@@ -280,18 +293,59 @@ impl FacetProcess {
         self.child.is_some() && self.received().any(writes)
     }
 
-    /// Returns how the process ended, if it did since the last poll.
+    /// Returns how the process ended, if it did since the last poll. A process that the system is about to end
+    /// counts: on a busy machine the threads of a killed one wait seconds for a core to end on.
     pub fn poll_exit(&mut self) -> Option<ExitStatus> {
+        let signals = &self.starter.signals;
+        self.ending.retain_mut(|child| {
+            let ends = matches!(child.try_wait(), Ok(None));
+            if !ends {
+                signals.ended(child.id());
+            }
+            ends
+        });
         let child = self.child.as_mut()?;
-        let status = child.try_wait().ok().flatten()?;
-        self.starter.signals.ended(child.id());
-        self.child = None;
-        // only another holder of the pipe can make this wait
-        self.reports.iter().for_each(|reports| reports.wait_for_end(LAST_REPORT_TIMEOUT));
+        let status = match child.try_wait().ok().flatten() {
+            Some(status) => {
+                self.starter.signals.ended(child.id());
+                self.child = None;
+                // only another holder of the pipe can make this wait
+                self.reports.iter().for_each(|reports| reports.wait_for_end(LAST_REPORT_TIMEOUT));
+                status
+            }
+            None => {
+                if self.looked.is_some_and(|at| at.elapsed() < ENDING_INTERVAL) {
+                    return None;
+                }
+                self.looked = Some(Instant::now());
+                let status = ending_status(child.id())?;
+                self.ending.extend(self.child.take());
+                status
+            }
+        };
         self.failed = !status.success();
         self.fault = status.code().filter(|code| OWN_FAILURES.contains(code)).map(|_| describe_exit(status));
         Some(status)
     }
+}
+
+/// Returns how a process ends that runs no code of its own any more, but cannot be waited for yet: SIGKILL is
+/// pending for its first thread, or this thread has ended and others still do.
+fn ending_status(pid: u32) -> Option<ExitStatus> {
+    let about = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    status_of(&about)
+}
+
+/// Reads the content of `/proc/PID/stat` (proc(5)): fields 3, 31 and 52 are the state, the pending signals and the
+/// status as `wait` returns it. The name in parentheses may contain anything.
+fn status_of(about: &str) -> Option<ExitStatus> {
+    const SIGKILL: i32 = 9;
+    let fields: Vec<&str> = about.rsplit_once(')')?.1.split_whitespace().collect();
+    let number = |field: usize| fields.get(field - 3)?.parse::<u64>().ok();
+    if fields.first() == Some(&"Z") {
+        return Some(ExitStatus::from_raw(number(52)? as i32));
+    }
+    (number(31)? & 1 << (SIGKILL - 1) != 0).then(|| ExitStatus::from_raw(SIGKILL))
 }
 
 /// Returns whether a facet that was started at a time prepares to join.
@@ -306,10 +360,37 @@ pub fn title(names: &[&str]) -> String {
 }
 
 pub fn describe_exit(status: ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt;
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("exit code {code}"),
         (None, Some(signal)) => format!("killed by signal {signal}"),
         _ => "of unknown cause".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_is_ending_has_a_status() {
+        let about = |state: &str, pending: u64, status: i32| {
+            let middle = ["0"; 27].join(" ");
+            format!("42 (a name) with) {state} {middle} {pending} {} {status}\n", ["0"; 20].join(" "))
+        };
+        let of = |text: &str| status_of(text).map(|status| (status.code(), status.signal()));
+        assert_eq!(of(&about("S", 0, 0)), None);
+        assert_eq!(of(&about("R", 1 << 14, 0)), None, "SIGTERM is no end");
+        assert_eq!(of(&about("R", 1 << 8, 0)), Some((None, Some(9))));
+        assert_eq!(of(&about("Z", 0, 9)), Some((None, Some(9))));
+        assert_eq!(of(&about("Z", 0, 2 << 8)), Some((Some(2), None)));
+        assert_eq!((of("42 (cut) S 0 0"), of("")), (None, None));
+        // the fields are where the system has them: a child that was not waited for
+        let mut child = Command::new("sh").args(["-c", "exit 3"]).spawn().unwrap();
+        let until = Instant::now() + Duration::from_secs(60);
+        let mut found = None;
+        while found.is_none() && Instant::now() < until {
+            found = ending_status(child.id());
+        }
+        assert_eq!(found, Some(child.wait().unwrap()));
     }
 }
