@@ -142,13 +142,13 @@ fn a_sphere_is_hidden_behind_a_larger_one() {
     assert!(visible(&outside, std::iter::once(0..4), &eye, 1).is_empty());
     let around = visible(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1);
     assert_eq!(around, [Visible { number: 0, pixels: PixelBox { from: [0; 2], to: [400; 2] } }]);
-    // a ball of 1 m at 10 m has tan(asin(0.1)) of 366 pixels per tangent around the middle
-    let [ball] = visible(&[(Point3::new(10.0, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1)[..] else { panic!() };
+    // one of 1 m at 10 m has tan(asin(0.1)) of 366 pixels per tangent around the middle
+    let [seen] = visible(&[(Point3::new(10.0, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1)[..] else { panic!() };
     let half = 366.1 * (0.1f64).asin().tan();
     let expected = [200.0 - half - 1.0, 200.0 + half + 1.0];
     for k in 0..2 {
-        assert!((f64::from(ball.pixels.from[k]) - expected[0]).abs() <= 1.0, "{ball:?}, {expected:?}");
-        assert!((f64::from(ball.pixels.to[k]) - expected[1]).abs() <= 1.0, "{ball:?}, {expected:?}");
+        assert!((f64::from(seen.pixels.from[k]) - expected[0]).abs() <= 1.0, "{seen:?}, {expected:?}");
+        assert!((f64::from(seen.pixels.to[k]) - expected[1]).abs() <= 1.0, "{seen:?}, {expected:?}");
     }
 }
 
