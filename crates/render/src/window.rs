@@ -42,6 +42,8 @@ pub struct WindowOptions {
     pub refresh_hz: Option<f64>,
     /// Text that the name of the graphics adapter must contain, in any case.
     pub adapter: Option<String>,
+    /// Whether it is shown when it opens; `winit::window::Window::set_visible` shows it later.
+    pub visible: bool,
 }
 
 impl WindowOptions {
@@ -57,6 +59,7 @@ impl WindowOptions {
             full_screen: false,
             refresh_hz: None,
             adapter: None,
+            visible: true,
         }
     }
 }
@@ -137,7 +140,8 @@ fn create(event_loop: &ActiveEventLoop, options: &WindowOptions) -> Result<Arc<W
         .with_title(&options.title)
         .with_inner_size(PhysicalSize::new(width, height))
         .with_decorations(options.decorated)
-        .with_resizable(options.resizable);
+        .with_resizable(options.resizable)
+        .with_visible(options.visible);
     let monitor = monitor::find(event_loop, options)?;
     let corner = monitor.as_ref().map_or(PhysicalPosition::default(), MonitorHandle::position);
     let position = if options.full_screen { Some([0, 0]) } else { options.position_px };

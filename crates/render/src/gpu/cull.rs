@@ -34,14 +34,45 @@ const MAX_CELLS: usize = 512;
 /// Smallest side of a cell, pixels.
 const CELL_PX: usize = 2;
 
-/// Returns the indices, among `ranges`, of the spheres that may have a visible pixel, in their
-/// order. `samples` per pixel determine how close to a pixel's edge a sample may be.
+/// A sphere that may have a visible pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visible {
+    /// Its index.
+    pub number: u32,
+    /// All pixels that it may have.
+    pub pixels: PixelBox,
+}
+
+/// A rectangle of pixels: columns and rows, from the upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelBox {
+    pub from: [u32; 2],
+    pub to: [u32; 2],
+}
+
+impl PixelBox {
+    /// A whole picture.
+    pub fn whole(eye: &Eye) -> PixelBox {
+        PixelBox { from: [0; 2], to: eye.size_px().map(|side| side as u32) }
+    }
+
+    /// The smallest box with all pixels of both.
+    pub fn with(self, other: PixelBox) -> PixelBox {
+        let each = |k: usize| (self.from[k].min(other.from[k]), self.to[k].max(other.to[k]));
+        let [(left, right), (top, bottom)] = [each(0), each(1)];
+        PixelBox { from: [left, top], to: [right, bottom] }
+    }
+}
+
+/// Returns the spheres among `ranges` that may have a visible pixel, in their order. `samples` per pixel
+/// determine how close to a pixel's edge a sample may be.
 pub fn visible(
     spheres: &[SphereBounds],
     ranges: impl Iterator<Item = Range<u32>>,
     eye: &Eye,
     samples: u32,
-) -> Vec<u32> {
+) -> Vec<Visible> {
+    let whole = PixelBox::whole(eye);
     let picture = Picture::of(eye);
     let mut map = Map::new(eye, samples);
     let mut outlines = Vec::with_capacity(spheres.len());
@@ -58,7 +89,10 @@ pub fn visible(
     outlines
         .iter()
         .filter(|(_, outline)| outline.as_ref().is_none_or(|o| !map.hides(o)))
-        .map(|(number, _)| *number)
+        .map(|(number, outline)| Visible {
+            number: *number,
+            pixels: outline.as_ref().map_or(whole, |o| o.pixels(whole)),
+        })
         .collect()
 }
 
@@ -144,6 +178,18 @@ impl Outline {
     /// Half its width and half its height, pixels.
     fn half_sides(&self) -> [f64; 2] {
         [self.shape[0].max(0.0).sqrt(), self.shape[2].max(0.0).sqrt()]
+    }
+
+    /// The pixels of a picture that it may touch, and one more on each side.
+    fn pixels(&self, PixelBox { to: [width, height], .. }: PixelBox) -> PixelBox {
+        let [across, down] = self.half_sides().map(|half| half + 1.0 + self.error);
+        // numbers beyond the range become its ends
+        let range = |middle: f64, half: f64, most: u32| {
+            [((middle - half).floor() as u32).min(most), ((middle + half).ceil() as u32).min(most)]
+        };
+        let ([left, right], [top, bottom]) =
+            (range(self.middle[0], across, width), range(self.middle[1], down, height));
+        PixelBox { from: [left, top], to: [right, bottom] }
     }
 
     /// An upper bound of the depth of its front, including rounding.

@@ -14,7 +14,7 @@ use super::pipelines::COLOR;
 use super::targets::finished_texture;
 use crate::RenderError;
 use crate::facet::{NumberFormat, Parity, PortableNumbers, ProjectorColor};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use tumble_scene::cave::Flip;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
@@ -127,10 +127,10 @@ impl Placed {
 /// The pass, its pictures and its textures.
 pub(crate) struct Finisher {
     layout: BindGroupLayout,
-    /// All colors; red; green and blue.
-    pipelines: [RenderPipeline; 3],
+    /// All colors; red; green and blue. Made when they are first needed.
+    pipelines: OnceLock<[RenderPipeline; 3]>,
     /// The same from a cube of pictures.
-    surfaces: [RenderPipeline; 3],
+    surfaces: OnceLock<[RenderPipeline; 3]>,
     nothing: [TextureView; TEXTURES],
     known: Vec<(Arc<Finish>, [TextureView; TEXTURES])>,
     whole: Option<Texture>,
@@ -162,19 +162,26 @@ impl Finisher {
         let entries = [entry(0, place), entry(1, numbers), entry(2, numbers), entry(3, numbers), entry(4, numbers)];
         let layout = device
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("finish"), entries: &entries });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("finish"),
-            source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()),
-        });
-        let pipelines = CHANNELS.map(|channels| pipeline(device, &layout, &module, "fs_place", channels));
-        let surfaces = CHANNELS.map(|channels| pipeline(device, &layout, &module, "fs_surface", channels));
         // no warp, a mask that keeps all light, no table
         let nothing = [
             upload(gpu, [1, 1], TextureFormat::Rg32Float, &[0; 8]),
             upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[255; 4]),
             upload(gpu, [1, 1], TextureFormat::Rgba8Unorm, &[0; 4]),
         ];
+        let (pipelines, surfaces) = Default::default();
         Finisher { layout, pipelines, surfaces, nothing, known: Vec::new(), whole: None, faces: None }
+    }
+
+    /// Returns the pipelines that place pictures, or take them from a cube of pictures.
+    fn pipelines(&self, gpu: &Gpu, around: bool) -> &[RenderPipeline; 3] {
+        let (kept, entry_point) = if around { (&self.surfaces, "fs_surface") } else { (&self.pipelines, "fs_place") };
+        kept.get_or_init(|| {
+            let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("finish"),
+                source: wgpu::ShaderSource::Wgsl(FINISH_WGSL.into()),
+            });
+            CHANNELS.map(|channels| pipeline(&gpu.device, &self.layout, &module, entry_point, channels))
+        })
     }
 
     /// Copies the middle of a picture, without `rim` pixels on each side.
@@ -187,7 +194,7 @@ impl Finisher {
         whole
     }
 
-    /// Places a picture and returns the whole.
+    /// Places a picture and returns the whole: the picture itself if that is all of it.
     pub fn place(
         &mut self,
         gpu: &Gpu,
@@ -196,10 +203,14 @@ impl Finisher {
         size: [u32; 2],
         placed: &Placed,
     ) -> Result<Texture, RenderError> {
-        let whole = self.whole(gpu, placed.whole_px);
         let plain = placed.is_plain();
+        let covers = plain && (placed.at_px, size) == ([0, 0], placed.whole_px);
+        if covers && rim == 0 {
+            return Ok(from.texture.clone());
+        }
+        let whole = self.whole(gpu, placed.whole_px);
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("finish") });
-        if placed.begin.is_some() || !plain {
+        if placed.begin.is_some() && !covers || !plain {
             self.pass(gpu, &mut encoder, (&from.view, &whole), (rim, size, placed), None)?;
         }
         if plain {
@@ -273,7 +284,7 @@ impl Finisher {
         });
         if !plain {
             let which = CHANNELS.iter().position(|c| *c == placed.channels).unwrap_or(0);
-            pass.set_pipeline(if around.is_some() { &self.surfaces[which] } else { &self.pipelines[which] });
+            pass.set_pipeline(&self.pipelines(gpu, around.is_some())[which]);
             pass.set_bind_group(0, &inputs, &[]);
             pass.set_scissor_rect(placed.at_px[0], placed.at_px[1], size[0], size[1]);
             pass.draw(0..3, 0..1);

@@ -80,11 +80,11 @@ impl<'a> Frame<'a> {
             };
             pass.set_bind_group(0, &self.view, &[]);
             if variant.spheres_first() {
-                self.stage.draw_sphere_depth(&mut pass, &pipelines.ids, &self.choice);
+                self.stage.draw_sphere_depth(&mut pass, pipelines.ids(), &self.choice);
             } else {
                 self.stage.draw_view_depth(
                     &mut pass,
-                    if ids.is_some() { &pipelines.ids } else { &pipelines.depth },
+                    if ids.is_some() { pipelines.ids() } else { pipelines.depth() },
                     &self.choice,
                 );
             }
@@ -101,10 +101,10 @@ impl<'a> Frame<'a> {
     /// Occlusion from depth, and its blur.
     fn draw_occlusion(&self, encoder: &mut CommandEncoder, pipelines: &Pipelines) {
         let t = self.targets;
-        for (pipeline, target, inputs) in [
-            (&pipelines.occlusion, &t.occlusion_raw, &self.occlusion_raw),
-            (&pipelines.blur, &t.occlusion, &self.occlusion_blur),
-        ] {
+        let [occlusion, blur] = pipelines.occlusion();
+        for (pipeline, target, inputs) in
+            [(occlusion, &t.occlusion_raw, &self.occlusion_raw), (blur, &t.occlusion, &self.occlusion_blur)]
+        {
             let mut pass = color_pass(encoder, "occlusion", target, None, None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &self.view, &[]);

@@ -1,11 +1,12 @@
-//! Shaders, binding layouts and pipelines. Layouts and shaders are created once per device,
+//! Shaders, binding layouts and pipelines. Layouts are created once per device, shaders and
 //! pipelines when a picture first needs them. There is one for each pass, pattern and quality, so
 //! that none computes what it does not show.
 
 use super::kept::{KEPT_LIGHTS, Part, with_flat_inputs};
-use super::pipeline_plan::{ALWAYS, Input, Plan, TEST, TEST_BEHIND, WHERE_ANY, WRITE, WRITE_BEHIND};
+use super::pipeline_plan::{ALWAYS, DepthUse, Input, Plan, TEST, TEST_BEHIND, WHERE_ANY, WRITE, WRITE_BEHIND};
 use crate::{DrawList, Light, Settings, Shadows};
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 use wgpu::{
     BindGroupLayout, BindGroupLayoutEntry, BindingType, BlendState, CompareFunction, Device, RenderPipeline,
     ShaderModule, ShaderStages, TextureFormat,
@@ -120,16 +121,17 @@ pub struct Pipelines {
     pub occlusion_layout: BindGroupLayout,
     pub texture_layout: BindGroupLayout,
     pub shadow_sampler: wgpu::Sampler,
-    /// Depth only: floor, meshes, spheres, spheres near the eye, and capsules.
-    pub depth: [RenderPipeline; 5],
-    /// Depth and the index of the nearest sphere, in the order of `depth`.
-    pub ids: [RenderPipeline; 5],
-    /// Depth of meshes in the picture's pass.
-    pub mesh_first: RenderPipeline,
-    pub occlusion: RenderPipeline,
-    pub blur: RenderPipeline,
+    device: Device,
+    /// Source of the shaders, except the edges of spheres.
+    common: String,
+    /// Whether shaders can write which samples of a pixel they cover.
+    sample_masks: bool,
+    depth: OnceLock<[RenderPipeline; 5]>,
+    ids: OnceLock<[RenderPipeline; 5]>,
+    mesh_first: OnceLock<RenderPipeline>,
+    occlusion: OnceLock<[RenderPipeline; 2]>,
     /// For several samples per pixel, and for one.
-    modules: [ShaderModule; 2],
+    modules: [OnceLock<ShaderModule>; 2],
     known: BTreeMap<Key, RenderPipeline>,
 }
 
@@ -171,62 +173,7 @@ impl Pipelines {
             entry(1, BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
         ];
         let texture_layout = layout(device, "texture", &albedo);
-        let pixels = shader(device, "picture", &[&common, EDGE_PIXELS_WGSL].concat());
-        let samples = if sample_masks {
-            shader(device, "picture", &[&common, EDGE_SAMPLES_WGSL].concat())
-        } else {
-            pixels.clone()
-        };
-        let occlusion = shader(device, "occlusion", OCCLUSION_WGSL);
-        let depth_only = [Some(&view_layout)];
-        let screen = [Some(&view_layout), Some(&occlusion_layout)];
-        let depth = |vs, fs, input, color, depth| {
-            let plan = Plan { vs, fs, input, color, depth: Some(depth), blend: None, samples: 1, constants: &[] };
-            plan.build(device, &pixels, &depth_only)
-        };
-        let picture = [Some(&view_layout), Some(&scene_layout), Some(&texture_layout)];
-        let mesh_first = Plan {
-            vs: "vs_mesh_depth",
-            fs: Some("fs_nothing"),
-            input: Input::Mesh,
-            color: Some(COLOR),
-            depth: Some(WRITE),
-            blend: None,
-            samples: 1,
-            constants: &[],
-        };
-        let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
-        let whole = |fs| {
-            let plan = Plan {
-                vs: "vs_whole",
-                fs: Some(fs),
-                input: Input::None,
-                color: Some(OCCLUSION),
-                depth: None,
-                blend: None,
-                samples: 1,
-                constants: &[],
-            };
-            plan.build(device, &occlusion, &screen)
-        };
         Pipelines {
-            depth: [
-                depth(mesh, None, Input::Mesh, None, WRITE),
-                depth(mesh, None, Input::Mesh, None, WRITE),
-                depth("vs_bounds", Some("fs_bounds_depth"), Input::SphereBounds, None, WRITE),
-                depth("vs_near", Some("fs_near_depth"), Input::SphereBounds, None, WRITE),
-                depth("vs_capsule_depth", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
-            ],
-            ids: [
-                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
-                depth(mesh, no_id, Input::Mesh, Some(ID), WRITE),
-                depth("vs_bounds", Some("fs_bounds_id"), Input::SphereBounds, Some(ID), WRITE),
-                depth("vs_near", Some("fs_near_id"), Input::SphereBounds, Some(ID), WRITE),
-                depth("vs_capsule_depth", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
-            ],
-            mesh_first: mesh_first.build(device, &pixels, &picture),
-            occlusion: whole("fs_occlusion"),
-            blur: whole("fs_blur"),
             shadow_sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("shadow"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -238,16 +185,112 @@ impl Pipelines {
             scene_layout,
             occlusion_layout,
             texture_layout,
-            modules: [samples, pixels],
+            device: device.clone(),
+            common,
+            sample_masks,
+            depth: OnceLock::new(),
+            ids: OnceLock::new(),
+            mesh_first: OnceLock::new(),
+            occlusion: OnceLock::new(),
+            modules: Default::default(),
             known: BTreeMap::new(),
         }
     }
 
+    /// Depth only: floor, meshes, spheres, spheres near the eye, and capsules.
+    pub fn depth(&self) -> &[RenderPipeline; 5] {
+        self.depth.get_or_init(|| {
+            let mesh = self.depth_pipeline("vs_mesh_depth", None, Input::Mesh, None, WRITE);
+            [
+                mesh.clone(),
+                mesh,
+                self.depth_pipeline("vs_bounds", Some("fs_bounds_depth"), Input::SphereBounds, None, WRITE),
+                self.depth_pipeline("vs_near", Some("fs_near_depth"), Input::SphereBounds, None, WRITE),
+                self.depth_pipeline("vs_capsule_depth", Some("fs_capsule_depth"), Input::Capsule, None, WRITE),
+            ]
+        })
+    }
+
+    /// Depth and the index of the nearest sphere, in the order of [`Self::depth`].
+    pub fn ids(&self) -> &[RenderPipeline; 5] {
+        let (mesh, no_id) = ("vs_mesh_depth", Some("fs_no_id"));
+        self.ids.get_or_init(|| {
+            [
+                self.depth_pipeline(mesh, no_id, Input::Mesh, Some(ID), WRITE_BEHIND),
+                self.depth_pipeline(mesh, no_id, Input::Mesh, Some(ID), WRITE),
+                self.depth_pipeline("vs_bounds", Some("fs_bounds_id"), Input::SphereBounds, Some(ID), WRITE),
+                self.depth_pipeline("vs_near", Some("fs_near_id"), Input::SphereBounds, Some(ID), WRITE),
+                self.depth_pipeline("vs_capsule_depth", Some("fs_capsule_no_id"), Input::Capsule, Some(ID), WRITE),
+            ]
+        })
+    }
+
+    /// Depth of meshes in the picture's pass.
+    pub fn mesh_first(&self) -> &RenderPipeline {
+        self.mesh_first.get_or_init(|| {
+            let plan = Plan {
+                vs: "vs_mesh_depth",
+                fs: Some("fs_nothing"),
+                input: Input::Mesh,
+                color: Some(COLOR),
+                depth: Some(WRITE),
+                blend: None,
+                samples: 1,
+                constants: &[],
+            };
+            plan.build(&self.device, self.module(true), &self.picture_layouts())
+        })
+    }
+
+    /// Occlusion, and its blur.
+    pub fn occlusion(&self) -> &[RenderPipeline; 2] {
+        self.occlusion.get_or_init(|| {
+            let module = shader(&self.device, "occlusion", OCCLUSION_WGSL);
+            ["fs_occlusion", "fs_blur"].map(|fs| {
+                let plan = Plan {
+                    vs: "vs_whole",
+                    fs: Some(fs),
+                    input: Input::None,
+                    color: Some(OCCLUSION),
+                    depth: None,
+                    blend: None,
+                    samples: 1,
+                    constants: &[],
+                };
+                plan.build(&self.device, &module, &[Some(&self.view_layout), Some(&self.occlusion_layout)])
+            })
+        })
+    }
+
+    fn depth_pipeline(
+        &self,
+        vs: &str,
+        fs: Option<&str>,
+        input: Input,
+        color: Option<TextureFormat>,
+        depth: DepthUse,
+    ) -> RenderPipeline {
+        let plan = Plan { vs, fs, input, color, depth: Some(depth), blend: None, samples: 1, constants: &[] };
+        plan.build(&self.device, self.module(true), &[Some(&self.view_layout)])
+    }
+
+    fn picture_layouts(&self) -> [Option<&BindGroupLayout>; 3] {
+        [Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)]
+    }
+
+    /// The shaders for one sample per pixel, or for several.
+    fn module(&self, one_sample: bool) -> &ShaderModule {
+        let one_sample = one_sample || !self.sample_masks;
+        let edges = if one_sample { EDGE_PIXELS_WGSL } else { EDGE_SAMPLES_WGSL };
+        self.modules[usize::from(one_sample)]
+            .get_or_init(|| shader(&self.device, "picture", &[&self.common, edges].concat()))
+    }
+
     /// Creates the missing pipelines.
-    pub fn prepare(&mut self, device: &Device, keys: impl Iterator<Item = Key>) {
+    pub fn prepare(&mut self, keys: impl Iterator<Item = Key>) {
         for key in keys {
             if !self.known.contains_key(&key) {
-                let made = self.make(device, key);
+                let made = self.make(key);
                 self.known.insert(key, made);
             }
         }
@@ -258,15 +301,10 @@ impl Pipelines {
         self.known.get(&key)
     }
 
-    fn make(&self, device: &Device, (pass, surface, variant): Key) -> RenderPipeline {
-        let first = variant.depth_first();
+    fn make(&self, (pass, surface, variant): Key) -> RenderPipeline {
         let constants = constants(surface, variant);
         let plan = plan(pass, variant, &constants);
-        plan.build(
-            device,
-            &self.modules[usize::from(first)],
-            &[Some(&self.view_layout), Some(&self.scene_layout), Some(&self.texture_layout)],
-        )
+        plan.build(&self.device, self.module(variant.depth_first()), &self.picture_layouts())
     }
 }
 

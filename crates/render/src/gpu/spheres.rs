@@ -1,7 +1,7 @@
 //! The spheres of a stage: their appearance, and the selection for a viewpoint.
 
 use super::Gpu;
-use super::cull::{SphereBounds, visible};
+use super::cull::{PixelBox, SphereBounds, visible};
 use super::data::{self, Eye};
 use super::stage::{Same, cloud_groups, group_items};
 use crate::{DrawList, RenderError};
@@ -27,6 +27,10 @@ pub struct Choice {
     pub spheres: Buffer,
     /// Ranges in `spheres`, one for each group.
     pub ranges: Vec<Range<u32>>,
+    /// For each group all pixels that its spheres may have.
+    pub boxes: Vec<PixelBox>,
+    /// All pixels.
+    pub picture: PixelBox,
     /// Whether a sphere is so near to the eye that its outline is no circle on a plane in front of
     /// it.
     pub near: bool,
@@ -71,15 +75,28 @@ impl Spheres {
             return Ok(Choice {
                 spheres: whole.clone(),
                 ranges: self.groups.iter().map(of).collect(),
+                boxes: vec![PixelBox::whole(eye); self.groups.len()],
+                picture: PixelBox::whole(eye),
                 near: eye.near_any(self.spheres.iter()),
             });
         }
         let samples = if which == Which::All { self.samples } else { 1 };
         let chosen = visible(&self.spheres, self.groups.iter().map(of), eye, samples);
-        let place = |number: u32| chosen.partition_point(|&n| n < number) as u32;
-        let ranges = self.groups.iter().map(of).map(|range| place(range.start)..place(range.end)).collect();
-        let near = eye.near_any(chosen.iter().map(|&n| &self.spheres[n as usize]));
-        Ok(Choice { spheres: sphere_buffer(gpu, &self.spheres, chosen.iter().copied())?, ranges, near })
+        let place = |number: u32| chosen.partition_point(|seen| seen.number < number);
+        let ranges: Vec<Range<usize>> =
+            self.groups.iter().map(of).map(|range| place(range.start)..place(range.end)).collect();
+        let none = PixelBox { from: [0; 2], to: [0; 2] };
+        let boxed = |range: &Range<usize>| {
+            chosen[range.clone()].iter().map(|seen| seen.pixels).reduce(PixelBox::with).unwrap_or(none)
+        };
+        let near = eye.near_any(chosen.iter().map(|seen| &self.spheres[seen.number as usize]));
+        Ok(Choice {
+            spheres: sphere_buffer(gpu, &self.spheres, chosen.iter().map(|seen| seen.number))?,
+            boxes: ranges.iter().map(boxed).collect(),
+            ranges: ranges.into_iter().map(|range| range.start as u32..range.end as u32).collect(),
+            picture: PixelBox::whole(eye),
+            near,
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! A draw list on the device: the data that all viewpoints share.
 
+use super::cull::PixelBox;
 use super::data::{self, Eye};
 use super::meshes::{MeshBuffers, MeshCache, uniform_buffer, vertex_buffer};
 use super::pipelines::{Key, Pass, Pipelines, Variant};
@@ -122,19 +123,26 @@ impl Stage {
             textures,
             strokes: [stroke_batch(gpu, list, false)?, stroke_batch(gpu, list, true)?],
         };
-        pipelines.prepare(&gpu.device, stage.keys());
+        pipelines.prepare(stage.keys(gpu.choosy));
         Ok(stage)
     }
 
-    /// The keys of all pipelines that a picture of it may need.
-    fn keys(&self) -> impl Iterator<Item = Key> {
-        let fixed = [(Pass::Sky, 0), (Pass::Soft, 0), (Pass::Shell, 0), (Pass::Line, 0), (Pass::LineOnTop, 0)];
+    /// The keys of all pipelines that a picture of it needs, and of those that a later one may need, whose
+    /// creation would delay it. Software drivers compile at the first use in any case, and get no others.
+    fn keys(&self, choosy: bool) -> impl Iterator<Item = Key> {
+        let present = [
+            (Pass::Sky, true),
+            (Pass::Soft, !self.soft_spheres.is_empty()),
+            (Pass::Shell, !self.shells.is_empty()),
+            (Pass::Line, self.strokes[0].count > 0),
+            (Pass::LineOnTop, self.strokes[1].count > 0),
+        ];
+        let fixed = present.into_iter().filter(move |(_, present)| *present || !choosy).map(|(pass, _)| (pass, 0));
         let ground = self.ground.iter().map(|(_, _, (surface, _))| (Pass::Ground, *surface));
         let meshes = self.groups.iter().map(|g| (Pass::Mesh, g.same.surface));
         let spheres = self.spheres.groups.iter().map(|g| (Pass::Sphere, g.surface));
         let capsules = self.capsule_groups.iter().map(|g| (Pass::Capsule, g.surface));
         fixed
-            .into_iter()
             .chain(ground)
             .chain(meshes)
             .chain(spheres)
@@ -147,7 +155,7 @@ impl Stage {
         for ((view, choice), layer) in self.shadow_views.iter().zip(&maps.layers) {
             let mut pass = super::frame::depth_pass(encoder, "shadow", layer);
             pass.set_bind_group(0, view, &[]);
-            self.draw_depth(&mut pass, &pipelines.depth, choice, |same| same.casters.clone());
+            self.draw_depth(&mut pass, pipelines.depth(), choice, |same| same.casters.clone());
         }
     }
 
@@ -205,7 +213,7 @@ impl Stage {
         self.draw_spheres(pass, choice, &select);
         pass.set_bind_group(2, &self.textures.white, &[]);
         if self.variant.spheres_first() && !self.groups.is_empty() {
-            pass.set_pipeline(&pipelines.mesh_first);
+            pass.set_pipeline(pipelines.mesh_first());
             self.groups.iter().for_each(|g| draw_mesh(pass, &g.mesh, &self.instances, g.same.all.clone()));
         }
         for same in &self.capsule_groups {
@@ -251,12 +259,13 @@ impl Stage {
         choice: &Choice,
         select: &impl Fn(&mut RenderPass, Pass, u32) -> bool,
     ) {
-        for (i, same) in self.spheres.groups.iter().enumerate() {
+        for (i, same) in self.spheres.groups.iter().enumerate().filter(|(i, _)| !choice.ranges[*i].is_empty()) {
             pass.set_bind_group(2, self.textures.of(same.texture), &[]);
             if !select(pass, Pass::Sphere, same.surface) {
                 continue;
             }
             if self.variant.depth_first() {
+                scissor(pass, &choice.boxes[i]);
                 pass.set_vertex_buffer(0, self.spheres.ranges.slice(..));
                 pass.draw(0..3, i as u32..i as u32 + 1);
             } else {
@@ -264,6 +273,7 @@ impl Stage {
                 pass.draw(0..4, choice.ranges[i].clone());
             }
         }
+        scissor(pass, &choice.picture);
     }
 
     /// Orders soft spheres for a viewpoint.
@@ -293,6 +303,11 @@ impl Batch {
 pub fn bind_view(gpu: &Gpu, pipelines: &Pipelines, eye: &Eye) -> Result<BindGroup, RenderError> {
     let uniform = uniform_buffer(gpu, &eye.floats(), "view")?;
     Ok(super::frame::bind(gpu, &pipelines.view_layout, &[uniform.as_entire_binding()]))
+}
+
+/// Limits what follows to a rectangle of the picture.
+fn scissor(pass: &mut RenderPass, PixelBox { from: [left, top], to: [right, bottom] }: &PixelBox) {
+    pass.set_scissor_rect(*left, *top, right - left, bottom - top);
 }
 
 fn draw_mesh(pass: &mut RenderPass, mesh: &MeshBuffers, instances: &Buffer, range: Range<u32>) {

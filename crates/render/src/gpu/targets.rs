@@ -71,7 +71,9 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
+    /// Without shadows, a texel that nobody reads is bound.
     pub fn new(gpu: &Gpu, size: u32, count: usize) -> Self {
+        let size = if count == 0 { 1 } else { size };
         let count = count.clamp(1, MAX_LAYERS) as u32;
         // OpenGL treats one layer as no array, and a multiple of six as a cube
         let spare = u32::from(gpu.opengl && (count == 1 || count.is_multiple_of(6)));
@@ -94,7 +96,7 @@ impl ShadowMaps {
     }
 
     pub fn fits(&self, size: u32, count: usize) -> bool {
-        self.size == size && self.layers.len() >= count
+        count == 0 || self.size == size && self.layers.len() >= count
     }
 }
 

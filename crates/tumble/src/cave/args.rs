@@ -345,6 +345,10 @@ pub struct CaveOptions {
     /// Restart a facet that ended by itself or was killed, at most 5 times in a minute.
     #[arg(long)]
     pub restart: bool,
+    /// Keep a second process of each facet of a window or in memory ready, which takes the place of one that
+    /// ended. It has compiled its pipelines and takes as much memory as the first.
+    #[arg(long, requires = "restart")]
+    pub stand_by: bool,
 }
 
 /// Options of `tumble replay`.
@@ -433,6 +437,9 @@ pub struct FacetOptions {
     /// facet again.
     #[arg(long, hide = true, conflicts_with = "overwrite")]
     pub continue_frames: bool,
+    /// Prepare, and join when the launcher says so. A launcher with --stand-by sets it.
+    #[arg(long, hide = true, requires = "parent_watch", conflicts_with = "web")]
+    pub stand_by: bool,
 }
 
 impl ServeOptions {

@@ -38,6 +38,41 @@ fn the_wall_goes_on_without_a_killed_facet_which_comes_back() {
     place.assert_clean();
 }
 
+/// The process that stands by takes the place of a killed one, and another one stands by then. Its own end harms
+/// nothing.
+#[test]
+fn a_process_that_stands_by_takes_the_place_of_a_killed_one() {
+    let place = Place::new("cave-standby", &wall());
+    let run = place.start(
+        "cave",
+        &["--offscreen", "--quality", "fastest", "--log-dir", &place.path("out"), "--restart", "--stand-by"],
+    );
+    place.wait_for("out", "r", 5);
+    let of = |facet: &str| -> Vec<i32> {
+        run.facets().into_iter().filter(|(name, pid)| name == facet && alive(*pid)).map(|(_, pid)| pid).collect()
+    };
+    wait("a second process of each facet", || of("l").len() == 2 && of("r").len() == 2);
+    let [first, standby] = of("r")[..] else { panic!() };
+    // what stands by shows nothing, and its end is no end of a facet
+    let other = of("l")[1];
+    signal(other, Signal::KILL);
+    signal(first, Signal::KILL);
+    let killed_at = *numbers(&place.log("out", "l")).last().unwrap();
+    wait("a third process", || of("r").len() == 2 && of("r")[0] == standby);
+    place.wait_for("out", "r", killed_at + 20);
+    place.wait_for("out", "l", killed_at + 20);
+    signal(run.pid(), Signal::TERM);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    assert!(wrong.contains("facet r ended (killed by signal 9)") && !wrong.contains("facet l ended"), "{wrong}");
+    assert!(!alive(standby), "it is left");
+    let states: std::collections::BTreeMap<u64, serde_json::Value> =
+        place.log("out", "l").iter().map(|line| (line["frame"].as_u64().unwrap(), line["state"].clone())).collect();
+    let right = place.log("out", "r");
+    assert!(right.iter().all(|line| states[&line["frame"].as_u64().unwrap()] == line["state"]));
+    place.assert_clean();
+}
+
 #[test]
 fn a_frozen_facet_is_dropped_and_comes_back_when_it_goes_on() {
     let place = Place::new("cave-freeze", &wall());

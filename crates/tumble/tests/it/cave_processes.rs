@@ -211,9 +211,11 @@ fn facets_that_are_missing_at_the_start_are_named() {
     // a facet that cannot start ends the start before the timeout
     let (code, _, wrong) = place.start("cave", &["--frames-dir", "/proc/nowhere", "--no-pictures"]).end();
     assert_eq!(code, Some(2), "{wrong}");
-    let (code, _, wrong) = place.start("cave", &["--log-dir", "/proc/nowhere", "--no-pictures"]).end();
+    std::fs::create_dir(place.folder.path("out")).unwrap();
+    std::fs::write(place.folder.path("out/l"), "no folder").unwrap();
+    let (code, _, wrong) = place.start("cave", &["--log-dir", &place.path("out"), "--no-pictures"]).end();
     assert_eq!(code, Some(1), "{wrong}");
-    assert!(wrong.contains("/proc/nowhere") && wrong.contains("ended before the start"), "{wrong}");
+    assert!(wrong.contains("out/l") && wrong.contains("ended before the start"), "{wrong}");
     place.assert_clean();
 }
 

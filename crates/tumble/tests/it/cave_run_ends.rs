@@ -325,6 +325,14 @@ fn what_cannot_go_well_is_refused_before_the_start() {
         assert!(wrong.contains(args[0]) || wrong.contains(args[1]), "{wrong}");
         assert!(wrong.contains(word), "{wrong}");
     }
+    // a show would otherwise end at its second scene, and each facet would complain about key and folder
+    let spaced = place.folder.write("spaced", "a key with spaces in it");
+    let taken = format!("{spaced}/frames");
+    for args in [&["--then", "nowhere.toml"][..], &["--web", "--web-key", &spaced], &["--log-dir", &taken]] {
+        let (code, _, wrong) = place.start("cave", args).end();
+        assert_eq!((code, wrong.matches("error: ").count()), (Some(2), 1), "{wrong}");
+        assert!(wrong.contains(args[args.len() - 1]), "{wrong}");
+    }
     assert!(Command::new("mkfifo").arg(place.path("key")).status().unwrap().success());
     std::fs::write(&place.cave, wall() + "[security]\nkey_file = \"key\"\n").unwrap();
     let (code, _, wrong) = place.start("serve", &["--transport", "udp"]).end();

@@ -1,9 +1,10 @@
 //! A cave on a desktop: an X server for the test (Xvfb), and a window per facet at the place in the
 //! cave file.
 
-use crate::cave_place::{ROOM, cave_of, in_place, make_runtime, wait};
+use crate::cave_place::{Place, Process, ROOM, alive, cave_of, in_place, make_runtime, signal, wait};
 use crate::common::{Folder, json, text};
 use crate::desktop::{Desktop, Running, skip};
+use rustix::process::Signal;
 use std::process::Stdio;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt, EventMask, MapState};
@@ -125,6 +126,41 @@ fn four_windows_open_where_the_cave_says_and_the_others_go_on_when_one_is_closed
             "{facet}"
         );
     }
+}
+
+/// A window that stands by is hidden, and opens at the place of a killed one.
+#[test]
+fn a_hidden_window_takes_the_place_of_a_killed_one() {
+    let Some(desktop) = Desktop::open() else { return };
+    if tumble::render::Renderer::new().is_err() {
+        return skip("this machine has no graphics adapter");
+    }
+    let place = Place::new("cave-hidden", &cave());
+    let args = ["--quality", "fastest", "--log-dir", &place.path("out"), "--restart", "--stand-by"];
+    let run = Process::start(place.command("cave", &args).env("DISPLAY", &desktop.display));
+    let (server, screen) = x11rb::connect(Some(&desktop.display)).unwrap();
+    let root = server.setup().roots[screen].root;
+    let all = || server.query_tree(root).unwrap().reply().unwrap().children.len();
+    wait("four windows", || windows(&server, root).len() == 4);
+    let shown = all();
+    let of = || -> Vec<i32> {
+        run.facets().into_iter().filter(|(name, pid)| name == "left" && alive(*pid)).map(|(_, pid)| pid).collect()
+    };
+    // one after the other, so that of the left facet is there when the third one begins
+    wait("hidden windows", || run.facets().len() > 6 && all() > shown);
+    assert_eq!(windows(&server, root).len(), 4);
+    let [first, standby] = of()[..] else { panic!() };
+    let before = place.log("out", "left").len();
+    signal(first, Signal::KILL);
+    wait("the window of the second process", || {
+        windows(&server, root).iter().any(|(title, _, at, _)| title.ends_with(" on left") && *at == [110, 20])
+            && of().first() == Some(&standby)
+            && place.log("out", "left").len() > before + 5
+    });
+    signal(run.pid(), Signal::TERM);
+    let (code, _, wrong) = run.end();
+    assert_eq!(code, Some(0), "{wrong}");
+    assert_eq!(windows(&server, root).len(), 0);
 }
 
 /// A bare X server without other clients resets when a connection ends, which cuts the others.

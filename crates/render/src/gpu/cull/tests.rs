@@ -140,7 +140,16 @@ fn a_sphere_is_hidden_behind_a_larger_one() {
     let outside = [([-3.0, 0.0, 0.0], 1.0), ([5.0, 6.0, 0.0], 1.0), ([5.0, 0.0, -7.0], 2.0), ([200.0, 0.0, 0.0], 1.0)]
         .map(|(at, r): ([f32; 3], f32)| (Point3::from(at), r));
     assert!(visible(&outside, std::iter::once(0..4), &eye, 1).is_empty());
-    assert_eq!(visible(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1), [0]);
+    let around = visible(&[(Point3::new(0.2, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1);
+    assert_eq!(around, [Visible { number: 0, pixels: PixelBox { from: [0; 2], to: [400; 2] } }]);
+    // one of 1 m at 10 m has tan(asin(0.1)) of 366 pixels per tangent around the middle
+    let [seen] = visible(&[(Point3::new(10.0, 0.0, 0.0), 1.0)], std::iter::once(0..1), &eye, 1)[..] else { panic!() };
+    let half = 366.1 * (0.1f64).asin().tan();
+    let expected = [200.0 - half - 1.0, 200.0 + half + 1.0];
+    for k in 0..2 {
+        assert!((f64::from(seen.pixels.from[k]) - expected[0]).abs() <= 1.0, "{seen:?}, {expected:?}");
+        assert!((f64::from(seen.pixels.to[k]) - expected[1]).abs() <= 1.0, "{seen:?}, {expected:?}");
+    }
 }
 
 /// Four layers of 50 x 50 spheres from in front and above, as in the example `frames`. Rays through
@@ -196,7 +205,7 @@ fn a_third_of_four_layers_is_culled_and_none_that_a_ray_meets() {
         1,
     );
     assert!(
-        met.len() > 2500 && met.iter().all(|i| drawn.binary_search(&(*i as u32)).is_ok()),
+        met.len() > 2500 && met.iter().all(|i| drawn.binary_search_by_key(&(*i as u32), |seen| seen.number).is_ok()),
         "{} spheres have a pixel",
         met.len()
     );

@@ -117,7 +117,7 @@ impl Console {
 /// # Errors
 /// The file cannot be read, or the token is shorter than 16 bytes.
 pub fn read_token(file: &Path) -> Result<String, Failure> {
-    let wrong = |why: String| Failure::input(format!("token file {}: {why}", file.display()));
+    let wrong = |why: String| Failure::input(format!("{}: {why}", file.display()));
     let mut text = String::new();
     if std::fs::metadata(file).is_ok_and(|about| !about.is_file()) {
         return Err(wrong("is no regular file".into()));

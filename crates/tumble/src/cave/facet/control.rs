@@ -12,6 +12,8 @@ use tumble::render::CalibrationPattern;
 
 /// Interval at which signals, parent and picture are polled.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Interval at which a facet that stands by looks for the launcher's line.
+pub const STANDBY_INTERVAL: Duration = Duration::from_millis(20);
 /// Time without a server after which the facet reports it.
 const REPORT_DELAY: Duration = Duration::from_secs(1);
 
@@ -19,6 +21,8 @@ const REPORT_DELAY: Duration = Duration::from_secs(1);
 const MAX_LINE_BYTES: u64 = 64;
 /// Beginning of a line that asks for a calibration pattern.
 pub const PATTERN_MARK: &str = "pattern ";
+/// The line that ends the standby of a facet.
+pub const JOIN_LINE: &str = "join";
 
 /// Conditions that end a facet, and its timeout.
 #[derive(Clone)]
@@ -53,6 +57,23 @@ impl FacetControl {
         self.parent.as_ref().and_then(Parent::pattern)
     }
 
+    /// Returns whether a facet that stands by may join: the launcher has said so.
+    pub fn may_join(&self) -> bool {
+        self.parent.as_ref().is_some_and(|parent| parent.join.load(Ordering::Relaxed))
+    }
+
+    /// Reports that the facet is prepared, and waits until it may join. Returns `false` if it must stop.
+    pub fn stand_by(&self) -> bool {
+        self.reporter.update(|report| report.preparing = false);
+        while !self.may_join() {
+            if self.should_stop() {
+                return false;
+            }
+            std::thread::sleep(STANDBY_INTERVAL);
+        }
+        true
+    }
+
     pub fn should_stop(&self) -> bool {
         self.signals.stop_requested() || self.is_orphaned() || self.end_all.load(Ordering::Relaxed)
     }
@@ -63,10 +84,12 @@ impl FacetControl {
 /// ```text
 /// pattern grid
 /// pattern off
+/// join
 /// ```
 #[derive(Clone, Default)]
 pub struct Parent {
     gone: Arc<AtomicBool>,
+    join: Arc<AtomicBool>,
     pattern: Arc<Mutex<Option<CalibrationPattern>>>,
 }
 
@@ -90,8 +113,11 @@ impl Parent {
             match pipe.by_ref().take(MAX_LINE_BYTES).read_until(b'\n', &mut line) {
                 Ok(1..) => {
                     let text = String::from_utf8_lossy(&line);
-                    if let Some(name) = text.trim().strip_prefix(PATTERN_MARK) {
-                        *self.pattern.lock().unwrap_or_else(PoisonError::into_inner) = name.parse().ok();
+                    match text.trim() {
+                        JOIN_LINE => self.join.store(true, Ordering::Relaxed),
+                        other => other.strip_prefix(PATTERN_MARK).into_iter().for_each(|name| {
+                            *self.pattern.lock().unwrap_or_else(PoisonError::into_inner) = name.parse().ok();
+                        }),
                     }
                 }
                 Ok(0) | Err(_) => return,
@@ -168,5 +194,8 @@ mod tests {
             parent.read(lines.as_bytes());
             assert_eq!(parent.pattern(), pattern, "{lines}");
         }
+        assert!(!parent.join.load(Ordering::Relaxed));
+        parent.read("joint\njoin\n".as_bytes());
+        assert!(parent.join.load(Ordering::Relaxed));
     }
 }

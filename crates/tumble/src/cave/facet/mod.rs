@@ -26,8 +26,8 @@ use super::signals::Signals;
 use super::simulation::CaveSimulation;
 use super::web::{FrameList, WebScreen, port_after};
 use crate::failure::Failure;
-pub use control::PATTERN_MARK;
 use control::{FacetControl, POLL_INTERVAL, Parent};
+pub use control::{JOIN_LINE, PATTERN_MARK};
 use desktop::{Desktop, Probe, desktop};
 use frame_log::{Earlier, FrameLog};
 use group::{LeaderFrame, Membership};
@@ -76,9 +76,39 @@ fn show(options: &FacetOptions, reporters: &[Reporter]) -> Result<(), Failure> {
         sealed: false,
     };
     let (painters, windows) = painters(options, &setup, &facets, &control, reporters)?;
-    let server = find_server(options, &setup, &control)?;
+    if let Windows::One(window, probe) = windows {
+        let join = || {
+            let mut runners = join(options, &setup, &facets, &control, reporters, (compute, vec![None]))?;
+            Ok(runners.remove(0)) // one for each painter
+        };
+        return window.show(&control, options.stand_by, options.draw.burn_in, probe, join);
+    }
+    if options.stand_by && !control.stand_by() {
+        return Ok(());
+    }
+    let mut runners = join(options, &setup, &facets, &control, reporters, (compute, painters))?;
+    match (windows, &mut runners[..]) {
+        (Windows::Several(wall), several) => wall.show(several, finish),
+        (_, [runner]) => {
+            let shown = runner.run();
+            finish(runner, shown)
+        }
+        (_, several) => together(several, &control.end_all),
+    }
+}
+
+/// Connects the facets of this process to the server. Each has a painter; `None` for one that draws nothing, or
+/// in a window.
+fn join(
+    options: &FacetOptions,
+    setup: &RunSetup,
+    facets: &[CaveFacet],
+    control: &FacetControl,
+    reporters: &[Reporter],
+    (compute, painters): (ComputeKind, Painters),
+) -> Result<Vec<FacetRunner>, Failure> {
+    let server = find_server(options, setup, control)?;
     let sealed = setup.cave.security.is_some() && matches!(server.address, ServerAddress::Udp(_));
-    let control = FacetControl { sealed, ..control };
     let applied = Arc::new(LeaderFrame::default());
     let mut runners = Vec::with_capacity(painters.len());
     for (k, painter) in painters.into_iter().enumerate() {
@@ -88,22 +118,11 @@ fn show(options: &FacetOptions, reporters: &[Reporter]) -> Result<(), Failure> {
             _ => Membership::Follower(applied.clone()),
         };
         let name = slot_name(facets.get(k)).to_owned();
-        let control = FacetControl { name, reporter: reporters[k].clone(), ..control.clone() };
-        let session = session(options, &setup, facets.get(k), &server, (compute, &membership))?;
+        let control = FacetControl { name, reporter: reporters[k].clone(), sealed, ..control.clone() };
+        let session = session(options, setup, facets.get(k), &server, (compute, &membership))?;
         runners.push(runner(options, session, membership, painter, control)?);
     }
-    match (windows, &mut runners[..]) {
-        (Windows::One(window, probe), [runner]) => {
-            let shown = window.show(runner, options.draw.burn_in, Some(probe));
-            finish(runner, shown)
-        }
-        (Windows::Several(wall), several) => wall.show(several, finish),
-        (_, [runner]) => {
-            let shown = runner.run();
-            finish(runner, shown)
-        }
-        (_, several) => together(several, &control.end_all),
-    }
+    Ok(runners)
 }
 
 /// Returns the facets of this process; none for the preview.

@@ -1,7 +1,9 @@
 //! A facet in a window of its own. Keys and mouse are sent to the server as a user's input.
 
 use super::burn_in;
+use super::control::{FacetControl, STANDBY_INTERVAL};
 use super::desktop::Probe;
+use super::finish;
 use super::render_thread::{ListMaker, PREVIEW_PX, slot_name};
 use super::runner::FacetRunner;
 use super::user_input::{HeldInput, InputSender};
@@ -47,6 +49,8 @@ pub struct WindowSetup {
     lists: ListMaker,
     options: WindowOptions,
     user: u16,
+    /// The world before the first frame.
+    world: World,
 }
 
 impl WindowSetup {
@@ -59,25 +63,38 @@ impl WindowSetup {
             Some(facet) => ViewMode::Facet(view, Box::new(facet.clone())),
             None => ViewMode::Unfolded(view),
         };
-        Ok(WindowSetup { view_mode, lists, options, user })
+        Ok(WindowSetup { view_mode, lists, options, user, world: setup.world.fork() })
     }
 
-    /// Opens the window and runs the facet until the run ends or the window is closed.
-    /// `probe` is a connection to the desktop, which ends when the window is open.
-    pub fn show(self, runner: &mut FacetRunner, burn_in: bool, probe: Option<Probe>) -> Result<(), Failure> {
-        let (options, sender) = (self.options.clone(), InputSender::new(self.user));
-        let mut window = Window {
+    /// Opens the window and runs the facet until the run ends or the window is closed. `join` connects it to
+    /// the server: before the window opens, or with `stand_by` when the launcher says so, and the window is
+    /// hidden meanwhile. `probe` is a connection to the desktop, which ends when the window is open.
+    pub fn show(
+        self,
+        control: &FacetControl,
+        stand_by: bool,
+        burn_in: bool,
+        probe: Probe,
+        mut join: impl FnMut() -> Result<FacetRunner, Failure>,
+    ) -> Result<(), Failure> {
+        let options = WindowOptions { visible: !stand_by, ..self.options.clone() };
+        let window = Window {
+            sender: InputSender::new(self.user),
             window_setup: self,
-            runner,
             burn_in,
             list: DrawList::default(),
             held: HeldInput::default(),
-            sender,
             warned: None,
             pattern: None,
-            probe,
+            probe: Some(probe),
         };
-        run_window(&options, &mut window)
+        let runner = if stand_by { None } else { Some(join()?) };
+        let mut app = FacetWindow { window, runner, control, join };
+        let shown = run_window(&options, &mut app);
+        match &mut app.runner {
+            Some(runner) => finish(runner, shown),
+            None => shown,
+        }
     }
 }
 
@@ -86,9 +103,8 @@ pub fn no_server(passed_s: u64) -> Image {
     caption(&[format!("no server for {passed_s} s; what you see is old")], 2)
 }
 
-struct Window<'a> {
+struct Window {
     window_setup: WindowSetup,
-    runner: &'a mut FacetRunner,
     burn_in: bool,
     /// Draw list of the shown frame.
     list: DrawList,
@@ -102,10 +118,30 @@ struct Window<'a> {
     probe: Option<Probe>,
 }
 
-impl Window<'_> {
-    fn draw(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let Some(frame) = self.runner.facet.begin() else { return Ok(()) };
-        let (world, viewer): (&World, _) = (self.runner.facet.world(), self.runner.facet.viewer());
+/// A window with its facet, which has joined or stands by.
+struct FacetWindow<'a, J> {
+    window: Window,
+    runner: Option<FacetRunner>,
+    control: &'a FacetControl,
+    join: J,
+}
+
+impl Window {
+    /// Draws a picture that nobody sees: the first one takes seconds to compile pipelines, and the server does
+    /// not know this facet yet.
+    fn prepare(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let default = if screen.is_software() { Quality::fast() } else { Quality::default() };
+        self.window_setup.lists.quality.get_or_insert(default);
+        self.list = self.window_setup.lists.list(&self.window_setup.world)?;
+        self.window_setup.view_mode.draw(screen, &self.list)?;
+        screen.renderer().wait()?;
+        self.probe = None;
+        Ok(())
+    }
+
+    fn draw(&mut self, runner: &mut FacetRunner, screen: &mut Screen) -> Result<(), Failure> {
+        let Some(frame) = runner.facet.begin() else { return Ok(()) };
+        let (world, viewer): (&World, _) = (runner.facet.world(), runner.facet.viewer());
         let time_s = world.time();
         self.list = self.window_setup.lists.list(world)?;
         let (ViewMode::Facet(view, _) | ViewMode::Unfolded(view)) = &mut self.window_setup.view_mode else {
@@ -113,33 +149,32 @@ impl Window<'_> {
         };
         apply_viewer(view, viewer, frame);
         self.window_setup.view_mode.draw(screen, &self.list)?;
-        self.pattern = match (&self.window_setup.view_mode, self.runner.pattern()) {
+        self.pattern = match (&self.window_setup.view_mode, runner.pattern()) {
             (ViewMode::Facet(view, facet), Some(pattern)) => Some(finished_calibration_picture(view, facet, pattern)),
             _ => None,
         };
         // a frame is drawn when the device has finished; it is read back only for the log, and for
         // the console once a second
-        let image = match self.runner.wants_picture() {
+        let image = match runner.wants_picture() {
             true if self.pattern.is_some() => self.pattern.clone(),
             true => Some(screen.renderer().read()?),
             false => screen.renderer().wait().map(|()| None)?,
         };
-        self.runner.drawn(frame, time_s, image)
+        runner.drawn(frame, time_s, image)
     }
 
-    fn present(&mut self, screen: &mut Screen, frame: u64) -> Result<(), Failure> {
+    fn present(&mut self, runner: &mut FacetRunner, screen: &mut Screen, frame: u64) -> Result<(), Failure> {
         // a pattern covers the picture
         let number = self.burn_in.then(|| burn_in::strip(screen.size_px()[0], frame));
         screen.set_caption(self.pattern.take().or(number));
         self.warned = None;
         // a hidden window shows nothing and must not delay the others
         screen.show()?;
-        self.runner.present(frame)
+        runner.present(frame)
     }
 
     /// Shows a warning that the picture is old.
-    fn warn(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let passed = self.runner.server_wait_s();
+    fn warn(&mut self, passed: u64, screen: &mut Screen) -> Result<(), Failure> {
         if passed >= 1 && self.warned != Some(passed) {
             self.warned = Some(passed);
             screen.set_caption(Some(no_server(passed)));
@@ -149,44 +184,58 @@ impl Window<'_> {
     }
 
     /// Sends the user's input if the server does not have it yet.
-    fn send(&mut self, screen: &Screen) -> Result<(), Failure> {
+    fn send(&mut self, runner: &mut FacetRunner, screen: &Screen) -> Result<(), Failure> {
         let ray = |at_px| self.window_setup.view_mode.ray(&self.list, screen.size_px(), at_px);
-        let wand = self.held.wand(self.runner.facet.viewer(), ray);
-        self.sender.send(&mut self.runner.facet, &self.held.keys, wand)
+        let wand = self.held.wand(runner.facet.viewer(), ray);
+        self.sender.send(&mut runner.facet, &self.held.keys, wand)
     }
 }
 
-impl WindowApp for Window<'_> {
+impl<J: FnMut() -> Result<FacetRunner, Failure>> FacetWindow<'_, J> {
+    /// Joins and shows the window when the launcher says so.
+    fn stand_by(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
+        if self.control.should_stop() {
+            return Ok(Next::End);
+        }
+        if !self.control.may_join() {
+            return Ok(Next::At(Instant::now() + STANDBY_INTERVAL));
+        }
+        let runner = self.runner.insert((self.join)()?);
+        screen.window().set_visible(true);
+        runner.prepared(screen.is_software(), screen.adapter());
+        Ok(Next::At(Instant::now()))
+    }
+}
+
+impl<J: FnMut() -> Result<FacetRunner, Failure>> WindowApp for FacetWindow<'_, J> {
     type Error = Failure;
 
     fn opened(&mut self, screen: &mut Screen) -> Result<(), Failure> {
-        let default = if screen.is_software() { Quality::fast() } else { Quality::default() };
-        self.window_setup.lists.quality.get_or_insert(default);
-        // the first picture takes seconds to compile pipelines; the server does not know this facet
-        // yet
-        self.list = self.window_setup.lists.list(self.runner.facet.world())?;
-        self.window_setup.view_mode.draw(screen, &self.list)?;
-        screen.renderer().wait()?;
-        self.probe = None;
-        self.runner.prepared(screen.is_software(), screen.adapter());
+        self.window.prepare(screen)?;
+        match &mut self.runner {
+            Some(runner) => runner.prepared(screen.is_software(), screen.adapter()),
+            None => self.control.reporter.update(|report| report.preparing = false),
+        }
         Ok(())
     }
 
     fn event(&mut self, _: &mut Screen, event: &WindowEvent) -> Result<(), Failure> {
-        self.held.event(event);
+        self.window.held.event(event);
         Ok(())
     }
 
     fn turn(&mut self, screen: &mut Screen) -> Result<Next, Failure> {
-        let Some(task) = self.runner.next(POLL_INTERVAL)?.filter(|_| !self.held.ended) else { return Ok(Next::End) };
+        let Some(runner) = &mut self.runner else { return self.stand_by(screen) };
+        let window = &mut self.window;
+        let Some(task) = runner.next(POLL_INTERVAL)?.filter(|_| !window.held.ended) else { return Ok(Next::End) };
         match task {
-            Task::Draw if !self.runner.has_room() => std::thread::sleep(POLL_INTERVAL),
-            Task::Draw => self.draw(screen)?,
-            Task::Present(frame) => self.present(screen, frame)?,
-            Task::Wait(WaitReason::Server | WaitReason::Lost) => self.warn(screen)?,
+            Task::Draw if !runner.has_room() => std::thread::sleep(POLL_INTERVAL),
+            Task::Draw => window.draw(runner, screen)?,
+            Task::Present(frame) => window.present(runner, screen, frame)?,
+            Task::Wait(WaitReason::Server | WaitReason::Lost) => window.warn(runner.server_wait_s(), screen)?,
             Task::Wait(_) | Task::Ended(_) => {}
         }
-        self.send(screen)?;
+        window.send(runner, screen)?;
         Ok(Next::At(Instant::now()))
     }
 }

@@ -35,7 +35,7 @@ pub struct Counts {
 impl Replay {
     /// Opens a recording of this scene.
     pub fn open(path: &Path, scene: [u8; 32]) -> Result<Replay, Failure> {
-        let wrong = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", path.display()));
+        let wrong = |e: &dyn std::fmt::Display| super::named(path, e);
         let mut reader = SessionReader::open(path).map_err(|e| wrong(&e))?;
         reader.check_scene(scene).map_err(|e| wrong(&e))?;
         let mut ahead = std::collections::VecDeque::new();

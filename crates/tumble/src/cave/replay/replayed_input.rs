@@ -36,7 +36,7 @@ pub struct Counts {
 impl ReplayedInput {
     /// Opens a recording of this scene that has every frame.
     pub fn open(path: &Path, scene: [u8; 32]) -> Result<ReplayedInput, Failure> {
-        let wrong = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", path.display()));
+        let wrong = |e: &dyn std::fmt::Display| super::named(path, e);
         let mut reader = SessionReader::open(path).map_err(|e| wrong(&e))?;
         reader.check_scene(scene).map_err(|e| wrong(&e))?;
         let now = reader.next_frame().map_err(|e| wrong(&e))?;

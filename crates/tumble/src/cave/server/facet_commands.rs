@@ -102,14 +102,25 @@ pub fn processes(cave: &Cave, launcher: Option<&CaveOptions>, web: &[String]) ->
     processes
 }
 
+/// Why a process of facets is started.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum FacetStart {
+    /// For the first time in a run.
+    First,
+    /// In the place of one that has ended.
+    Again,
+    /// To take the place of one that may end.
+    StandBy,
+}
+
 /// Returns the arguments of a process with these facets; `web` is the address at which the first one serves
-/// browsers, and `again` says that it is started again.
+/// browsers.
 pub fn facet_args(
     launcher: &CaveOptions,
     names: &[&str],
     address: &ServerAddress,
     web: Option<&SocketAddr>,
-    again: bool,
+    start: FacetStart,
 ) -> Vec<String> {
     let mut args = vec!["facet".to_owned()];
     args.extend(scene_args(&launcher.serve));
@@ -140,9 +151,11 @@ pub fn facet_args(
             .iter()
             .flat_map(|w| ["--debug-draw".to_owned(), w.clone()]),
     );
+    let first = start == FacetStart::First;
     let switches = [
-        ("--overwrite", draw.overwrite && !again),
-        ("--continue-frames", again),
+        ("--overwrite", draw.overwrite && first),
+        ("--continue-frames", !first),
+        ("--stand-by", start == FacetStart::StandBy),
         ("--burn-in", draw.burn_in),
         ("--offscreen", draw.offscreen),
         ("--no-pictures", draw.no_pictures),

@@ -4,6 +4,7 @@
 mod contact_sound;
 mod ending;
 mod facet_commands;
+mod facet_process;
 mod facet_processes;
 mod histogram;
 mod input_devices;

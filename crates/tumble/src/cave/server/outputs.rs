@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::frames_folder::begin_all;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 use tumble::scene::cave::Cave;
 
@@ -23,6 +23,11 @@ pub fn check(
 ) -> Result<(), Failure> {
     let recorded = Target::of(options, cave.recording.as_ref(), replaying);
     recorded.as_ref().map_or(Ok(false), Target::check)?;
+    if let Some(recorded) = &recorded
+        && std::fs::metadata(&recorded.file).is_ok_and(|about| about.file_type().is_fifo())
+    {
+        eprintln!("{}: is a pipe; the run waits until something reads it", recorded.file.display());
+    }
     if let (Some(read), Some(written)) = (&options.replay_input, &recorded)
         && same(read, &written.file)
     {
@@ -39,10 +44,14 @@ pub fn check(
     options.summary.as_deref().map_or(Ok(()), writable)?;
     let draw = launcher.map(|launcher| &launcher.draw);
     let folder = draw.and_then(|draw| draw.frames_dir.as_deref().or(draw.log_dir.as_deref()));
-    folder.map_or(Ok(()), |folder| begin_all(folder, draw.is_some_and(|draw| draw.overwrite)))
+    let Some(folder) = folder else { return Ok(()) };
+    begin_all(folder, draw.is_some_and(|draw| draw.overwrite))?;
+    // each facet would otherwise say so
+    std::fs::create_dir_all(folder).map_err(|e| Failure::input(format!("{}: cannot be created: {e}", folder.display())))
 }
 
-/// Refuses outputs of which the next scene would replace those of the one before.
+/// Refuses outputs of which the next scene would replace those of the one before, and further scenes that cannot
+/// be read: a show is not to end at its second scene.
 pub fn check_scenes(options: &ServeOptions, launcher: Option<&CaveOptions>, replaying: bool) -> Result<(), Failure> {
     let frames = launcher.is_some_and(|l| l.draw.frames_dir.is_some() || l.draw.log_dir.is_some());
     let files = options.record.is_some() || options.summary.is_some() || options.replay_input.is_some();
@@ -51,7 +60,7 @@ pub fn check_scenes(options: &ServeOptions, launcher: Option<&CaveOptions>, repl
             "--then: further scenes go without --frames-dir, --log-dir, --record, --summary, --replay-input and replays",
         ));
     }
-    Ok(())
+    options.then.iter().try_for_each(|name| options.scene.opening.read(name).map(drop))
 }
 
 /// Returns whether two paths name the same file.

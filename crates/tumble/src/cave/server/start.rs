@@ -15,7 +15,7 @@ use crate::cave::replay::frames::Replay;
 use crate::cave::run_setup::{Role, RunSetup};
 use crate::cave::signals::Signals;
 use crate::cave::simulation::CaveSimulation;
-use crate::cave::web::new_key;
+use crate::cave::web::{new_key, read_key};
 use crate::failure::Failure;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -63,8 +63,9 @@ pub fn run(options: &ServeOptions, launcher: Option<&CaveOptions>, recording: Op
     Ok(())
 }
 
-/// Draws the key of the links of browsers, if there are any.
+/// Draws the key of the links of browsers, if there are any. A key file is read by the facets, and checked here.
 fn with_key(launcher: &CaveOptions) -> Result<CaveOptions, Failure> {
+    launcher.web.web_key.as_deref().map(read_key).transpose()?;
     let drawn_key = launcher.web.web.map(|_| new_key()).transpose()?;
     Ok(CaveOptions { web: WebOptions { drawn_key, ..launcher.web.clone() }, ..launcher.clone() })
 }

@@ -17,4 +17,4 @@ mod link;
 mod screen;
 
 pub use frame_list::FrameList;
-pub use screen::{KEY_VARIABLE, WebScreen, new_key, port_after};
+pub use screen::{KEY_VARIABLE, WebScreen, new_key, port_after, read_key};

@@ -194,18 +194,26 @@ fn check(setup: &RunSetup, facet: &Facet) -> Result<(), Failure> {
 /// Returns the key of the link: of a file, of the launcher, or a new one.
 fn key(file: Option<&Path>) -> Result<String, Failure> {
     if let Some(file) = file {
-        let key = read_token(file)?;
-        return match key.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.~".contains(&b)) {
-            true => Ok(key),
-            false => Err(Failure::input(format!(
-                "key file {}: expected letters, digits and -_.~ alone, because the key is part of a link",
-                file.display()
-            ))),
-        };
+        return read_key(file);
     }
     match std::env::var(KEY_VARIABLE) {
         Ok(key) if key.len() >= MIN_KEY_BYTES && key.bytes().all(|b| b.is_ascii_alphanumeric()) => Ok(key),
         _ => new_key(),
+    }
+}
+
+/// Reads the key of the links from a file.
+///
+/// # Errors
+/// The file cannot be read, or has no key that fits into a link.
+pub fn read_key(file: &Path) -> Result<String, Failure> {
+    let key = read_token(file)?;
+    match key.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_.~".contains(&b)) {
+        true => Ok(key),
+        false => Err(Failure::input(format!(
+            "key file {}: expected letters, digits and -_.~ alone, because the key is part of a link",
+            file.display()
+        ))),
     }
 }
 
