@@ -54,10 +54,10 @@ table! {
     bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "177b70cbfeccbaf8";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
     chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";
-    falling_time_stepping: "falling", TimeStepping, "7eb30b32d218834a", "64ebb2fda8d18548";
+    falling_time_stepping: "falling", TimeStepping, "b7daa548462f5142", "7cae47a62c963de7";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "541c5f168d0c3553", "c4d3ea502ff23a9f";
+    falling_backtracking: "falling", Backtracking, "541c5f168d0c3553", "6ec9bd1e500b65f3";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -65,9 +65,9 @@ table! {
     piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
     robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "ab1a03e9bd8ec5bb";
-    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "5c1c0c226f0c53fe";
+    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "3eadc1e4cf6cf68e";
     skeleton_time_stepping: "skeleton", TimeStepping, "e2f709491ea28dc6", "977480983f29d479";
-    skeleton_backtracking: "skeleton", Backtracking, "a5c9e7e222e6da4f", "1919a624d8ce8cf1";
+    skeleton_backtracking: "skeleton", Backtracking, "a5c9e7e222e6da4f", "3878052a4136eb37";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -92,10 +92,10 @@ table! {
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
     arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "17736b4a409409d7";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "19c809b3edaf11c5";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "050f15eda4c35c7a";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "6e69fb4e45ddca89";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "dd93b3ba2f28eb55";
     mechanism_time_stepping: "mechanism", TimeStepping, "5b4d12d63f4d7f7e", "7185e7c6f3855768";
-    dominoes_time_stepping: "dominoes", TimeStepping, "f6b0576dde7a68ab", "83af33e8d00359c4";
+    dominoes_time_stepping: "dominoes", TimeStepping, "3e999483436aff8f", "bc6eb97a7494a75e";
 }
 
 table! {
