@@ -189,8 +189,11 @@ def test_what_was_left_unfinished_is_removed_after_a_day(tmp_path):
 
 
 SCRIPT = """
-import os, sys, time
+import os, signal, sys, time
 import tumble.distributed
+
+# where the tests run in the background, Python finds SIGINT ignored and leaves it so
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def slow(number):
     time.sleep(60 if number >= 12 and "QUICK" not in os.environ else 0)
