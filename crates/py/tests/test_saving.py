@@ -53,9 +53,9 @@ def test_joints_keep_their_names_and_drives(tmp_path, root):
 
 
 def test_a_missing_folder_is_named(tmp_path):
-    for write in (tumble.World().save_scene, made().save_mjcf):
+    for write, name in [(tumble.World().save_scene, "world.toml"), (made().save_mjcf, "world.xml")]:
         with pytest.raises(tumble.MissingFileError, match=f"there is no folder {tmp_path / 'none'}"):
-            write(tmp_path / "none" / "world.file")
+            write(tmp_path / "none" / name)
 
 
 def test_settings_of_load_count(tmp_path):
