@@ -16,6 +16,7 @@ mod failure;
 mod frames_folder;
 mod help;
 mod mpcdi;
+mod player;
 mod progress;
 mod recording_file;
 mod run;

@@ -6,7 +6,7 @@ mod values;
 
 pub use caves::{CalibrateAction, CalibrateOptions, CavesOptions, MpcdiOptions, SolveOptions};
 pub use scene::{OpeningOptions, SceneOptions, kind};
-pub use values::{cutoff, lead, rate, seconds, web_timeout};
+pub use values::{cutoff, gain, lead, rate, seconds, web_timeout};
 
 use crate::cave::args::{
     CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions,
@@ -17,7 +17,7 @@ use tumble::collide::Builder;
 use tumble::render::{DebugDraw, Quality};
 use tumble::scene::urdf::{JointPositions, MissingMeshes};
 use values::{
-    folder, fraction, gain, joint_positions, method, missing, package, per_link, planner, png, pose_count, size, wav,
+    folder, fraction, joint_positions, method, missing, package, per_link, planner, png, pose_count, size, wav,
 };
 
 /// Real-time dynamics for interactive and immersive environments.
@@ -199,6 +199,8 @@ pub struct ViewOptions {
     /// Pictures per second, at most (default: the desktop's refresh rate).
     #[arg(long, help_heading = "Window", value_name = "N", value_parser = rate)]
     pub fps: Option<f64>,
+    #[command(flatten, next_help_heading = "Session")]
+    pub play: crate::player::PlayOptions,
     /// End at this simulated time, s.
     #[arg(long, help_heading = "Stepping", value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,

@@ -17,7 +17,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1e6)
 }
 
-pub(super) fn gain(text: &str) -> Result<f64, String> {
+pub fn gain(text: &str) -> Result<f64, String> {
     number(text, -tumble::sound::MAX_GAIN_DB, tumble::sound::MAX_GAIN_DB)
 }
 

@@ -133,6 +133,8 @@ pub struct ServeOptions {
     /// Send contacts to a sound engine at this address: impacts, slides and listeners as OSC over UDP.
     #[arg(long, value_name = "ADDR:PORT")]
     pub sound: Option<SocketAddr>,
+    #[command(flatten)]
+    pub play: crate::player::PlayOptions,
     /// Write the sound of the run at each user's head: DIR/USER.wav, one gain for all.
     #[arg(long, value_name = "DIR", requires = "duration", conflicts_with_all = ["console", "then"])]
     pub audio: Option<PathBuf>,

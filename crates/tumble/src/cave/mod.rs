@@ -71,7 +71,7 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
     let scene = &serve.scene;
     let method = scene.stepper.is_some() || scene.solver.is_some() || scene.integrator.is_some();
     let stepping = scene.dt.is_some() || scene.threads.is_some() || scene.budget.is_some() || method;
-    let sound = serve.sound.is_some() || serve.audio.is_some();
+    let sound = serve.sound.is_some() || serve.audio.is_some() || serve.play.play.is_some();
     let everywhere = serve.compute == Some(args::ComputeKind::Everywhere);
     if serve.record.is_some()
         || serve.record_cameras
@@ -83,7 +83,7 @@ pub fn replay(options: &ReplayOptions) -> Result<(), Failure> {
         || sound
     {
         return Err(Failure::input(
-            "a replay shows what was recorded; --record, --record-cameras, --user-colliders, --tracker, --vrpn, --openxr, --gamepad, --sound, --audio, --replay-input, --contacts, --events, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
+            "a replay shows what was recorded; --record, --record-cameras, --user-colliders, --tracker, --vrpn, --openxr, --gamepad, --sound, --audio, --play, --replay-input, --contacts, --events, --dt, --stepper, --solver, --integrator, --threads, --budget and --compute everywhere go with tumble cave",
         ));
     }
     server::run(serve, Some(&options.cave), Some(&options.file))

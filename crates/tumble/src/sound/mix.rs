@@ -56,23 +56,38 @@ impl Listener {
 
 /// Two channels.
 #[derive(Default)]
-pub(super) struct Canvas(pub Vec<[f64; 2]>);
+pub(super) struct Canvas {
+    /// Samples of both ears, without those taken.
+    pub samples: Vec<[f64; 2]>,
+    /// Number of samples that were taken.
+    taken: usize,
+}
 
 impl Canvas {
     /// Adds the samples of a source at a point, from a time on, s. Times between samples are interpolated.
     pub fn add(&mut self, listener: &Listener, time: f64, point: [f64; 3], samples: &[f64]) {
         let (gains, delay) = listener.hears(point);
         let at = (time + delay).max(0.0) * f64::from(RATE_HZ);
-        let (first, share) = (at.floor() as usize, at.fract());
-        if self.0.len() < first + samples.len() + 1 {
-            self.0.resize(first + samples.len() + 1, [0.0; 2]);
+        let (first, share) = ((at.floor() as usize).saturating_sub(self.taken), at.fract());
+        if self.samples.len() < first + samples.len() + 1 {
+            self.samples.resize(first + samples.len() + 1, [0.0; 2]);
         }
         let mut before = 0.0;
         for (n, sample) in samples.iter().copied().chain([0.0]).enumerate() {
             let value = (1.0 - share) * sample + share * before;
             before = sample;
-            let [left, right] = &mut self.0[first + n];
+            let [left, right] = &mut self.samples[first + n];
             (*left, *right) = (*left + gains[0] * value, *right + gains[1] * value);
         }
+    }
+
+    /// Takes the samples before the number `end`.
+    pub fn take(&mut self, end: usize) -> Vec<[f64; 2]> {
+        let count = end.saturating_sub(self.taken);
+        if self.samples.len() < count {
+            self.samples.resize(count, [0.0; 2]);
+        }
+        self.taken += count;
+        self.samples.drain(..count).collect()
     }
 }

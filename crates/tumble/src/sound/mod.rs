@@ -5,6 +5,7 @@
 //! the same run gives the same samples. `docs/sound.md` has the model and its figures.
 
 mod body;
+mod live;
 mod materials;
 mod mix;
 mod observe;
@@ -16,6 +17,7 @@ mod wav;
 mod tests;
 
 pub use body::{MODES, SoundBody};
+pub use live::{LIVE_GAIN_DB, LiveFrame, LiveMixer, LiveSound};
 pub use materials::{SOUND_MATERIALS, SoundMaterial};
 pub use mix::{Listener, RATE_HZ, SPEED_OF_SOUND};
 pub use observe::{Impact, Impacts, Slide, Soundtrack, slides};

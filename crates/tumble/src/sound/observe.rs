@@ -204,8 +204,14 @@ impl Soundtrack {
             let noise = noises.entry(*number).or_insert_with(|| Noise::new(*number));
             canvas.add(&at(rub.time), rub.time, rub.point, &rub.samples(noise));
         }
-        canvas.0.resize(((end + 1.0) * f64::from(RATE_HZ)).ceil().max(0.0) as usize, [0.0; 2]);
-        Ok(Mixed { samples: canvas.0 })
+        canvas.samples.resize(((end + 1.0) * f64::from(RATE_HZ)).ceil().max(0.0) as usize, [0.0; 2]);
+        Ok(Mixed { samples: canvas.samples })
+    }
+
+    /// Takes what was collected, with the time of the world, s, as seconds after the start of the first frame.
+    pub(super) fn take(&mut self, time: f64) -> (Vec<Strike>, Vec<(u64, Rub)>, f64) {
+        let seconds = self.begin.map_or(0.0, |begin| time - begin);
+        (std::mem::take(&mut self.strikes), std::mem::take(&mut self.rubs), seconds)
     }
 }
 

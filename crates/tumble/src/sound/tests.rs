@@ -279,3 +279,63 @@ fn a_listener_that_moves_hears_from_where_it_is() {
     assert!(click(0.1) < 1e-9 && click(1.1) > 1.0, "{} {}", click(0.1), click(1.1));
     assert!(track.mix_moving(&[], 1.0).is_err());
 }
+
+/// A ball that bounces on a slab and a block that slides, heard frame by frame and all at once.
+#[test]
+fn a_run_sounds_the_same_while_it_runs() {
+    let text = "[[body]]\nname = \"slab\"\nmode = \"static\"\nshape = { type = \"box\", size_m = [4, 4, 0.1] }\nsound = \"wood\"\n\
+        [[body]]\nname = \"ball\"\nshape = { type = \"sphere\", radius_m = 0.05 }\nmass_kg = 1.0\nsound = \"steel\"\nposition_m = [0.2, 0, 0.2]\n\
+        [[body]]\nname = \"block\"\nshape = { type = \"box\", size_m = [0.1, 0.1, 0.1] }\nmass_kg = 1.0\nsound = \"wood\"\nposition_m = [-0.5, 0, 0.1]\nvelocity_m_per_s = [2, 0, 0]\n";
+    let scene = tumble_scene::SceneFile::parse(text, "s.toml").unwrap();
+    let mut world = scene.build().unwrap().0;
+    let (mut whole, mut live, mut mixer) =
+        (Soundtrack::of_scene(&scene), LiveSound::new(scene.clone()), LiveMixer::new(0.0));
+    let ears = Listener { position: [0.0, -1.0, 0.5], right: [1.0, 0.0, 0.0] };
+    let mut samples = Vec::new();
+    for k in 0..240 {
+        world.step().unwrap();
+        whole.frame(&world);
+        live.step(&world);
+        if k % 3 == 2 {
+            samples.extend(mixer.mix(&live.frame(&ears)));
+        }
+    }
+    let expected = whole.mix(&ears, 1.0).unwrap();
+    assert!((47_998..=48_000).contains(&samples.len()), "{} samples of a second", samples.len());
+    assert!(expected.peak() > 1e-3 && expected.peak() < 0.98 && mixer.gain_db() == 0.0);
+    for (k, (sample, expected)) in samples.iter().zip(&expected.samples).enumerate() {
+        assert!((0..2).all(|ear| (sample[ear] - expected[ear]).abs() < 1e-12), "{k}: {sample:?} and {expected:?}");
+    }
+
+    // from the start again: what sounded before has ended, and the same is heard
+    let first = samples;
+    let mut world = scene.build().unwrap().0;
+    let mut again = Vec::new();
+    for _ in 0..240 {
+        world.step().unwrap();
+        live.step(&world);
+        again.extend(mixer.mix(&live.frame(&ears)));
+    }
+    let differs = first.iter().zip(&again).filter(|(a, b)| (0..2).any(|ear| (a[ear] - b[ear]).abs() > 1e-9)).count();
+    assert_eq!((differs, live.left_out()), (0, 0));
+}
+
+/// The gain falls at the first sample that would exceed full scale, and stays.
+#[test]
+fn a_live_gain_only_falls() {
+    let text = "[[body]]\nname = \"floor\"\nmode = \"static\"\nshape = { type = \"half_space\" }\n\
+        [[body]]\nname = \"ball\"\nshape = { type = \"sphere\", radius_m = 0.1 }\nmass_kg = 1.0\nsound = \"wood\"\nposition_m = [0, 0, 0.4]\nrestitution = 0.5\n";
+    let scene = tumble_scene::SceneFile::parse(text, "s.toml").unwrap();
+    let mut world = scene.build().unwrap().0;
+    let (mut live, mut mixer) = (LiveSound::new(scene), LiveMixer::new(120.0));
+    let ears = Listener { position: [0.0, -1.0, 0.5], right: [1.0, 0.0, 0.0] };
+    let (mut gains, mut peak) = (vec![mixer.gain_db()], 0.0f64);
+    for _ in 0..480 {
+        world.step().unwrap();
+        live.step(&world);
+        peak = mixer.mix(&live.frame(&ears)).iter().flatten().fold(peak, |most, x| most.max(x.abs()));
+        gains.push(mixer.gain_db());
+    }
+    assert!(gains.is_sorted_by(|a, b| a >= b) && gains[480] < 100.0, "{} dB", gains[480]);
+    assert!((peak - 0.98).abs() < 1e-12, "{peak}");
+}

@@ -6,7 +6,7 @@ use std::io::Cursor;
 /// Longest soundtrack, s.
 pub const MAX_SECONDS: f64 = 3600.0;
 /// Largest sample of a file.
-const CEILING: f64 = 0.98;
+pub(super) const CEILING: f64 = 0.98;
 /// Peak of a track whose gain nobody has chosen: −3 dB.
 const USUAL_PEAK: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Peak below which a track is silence: the smallest step of 16 bits at a gain of 120 dB.

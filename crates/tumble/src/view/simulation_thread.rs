@@ -9,12 +9,14 @@ use super::picker::Picker;
 use super::real_time::RealTime;
 use super::statistics::Meter;
 use crate::failure::Failure;
+use crate::player::Player;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tumble::dynamics::World;
+use tumble::sound::Listener;
 
 /// Longest time for steps that are due at once, exceeded by one step at most. Time that is still
 /// due is then skipped.
@@ -32,6 +34,9 @@ pub struct Simulation {
     pub picker: Option<Picker>,
     /// The error that stopped the simulation.
     pub error: Option<String>,
+    /// `--play`, and the ears of the user.
+    pub player: Option<Player>,
+    pub ears: Listener,
     /// Durations of the steps.
     pub steps: Meter,
     /// Number of changes of the world: steps, resets and joints moved by hand.
@@ -47,7 +52,7 @@ pub struct Simulation {
 
 impl Simulation {
     /// Starts at time 0; ends after `last` steps.
-    pub fn new(world: World, real_time: RealTime, last: Option<u64>) -> Simulation {
+    pub fn new(world: World, real_time: RealTime, last: Option<u64>, player: Option<Player>) -> Simulation {
         let start = world.save();
         let steps = Meter::default();
         Simulation {
@@ -55,6 +60,8 @@ impl Simulation {
             real_time,
             picker: None,
             error: None,
+            player,
+            ears: Listener::looking([0.0; 3], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
             steps,
             changes: 0,
             start,
@@ -90,6 +97,9 @@ impl Simulation {
         }
         self.steps.add(clock.elapsed());
         self.changes += 1;
+        if let Some(player) = &mut self.player {
+            player.step_and_play(&self.world, &self.ears).iter().for_each(|said| eprintln!("{said}"));
+        }
         true
     }
 

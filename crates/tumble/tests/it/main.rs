@@ -22,6 +22,7 @@ mod cave_processes;
 mod cave_recordings;
 mod cave_relay;
 mod cave_run_ends;
+mod cave_sound;
 mod cave_tracker;
 mod cave_users;
 mod cave_walking;

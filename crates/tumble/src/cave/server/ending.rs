@@ -8,6 +8,7 @@ use super::summary::{Summary, refused, unknown_peers_line};
 use crate::atomic_file::write_file;
 use crate::cave::args::TransportKind;
 use crate::failure::Failure;
+use crate::player::Player;
 use tumble::scene::cave::Mode;
 
 impl RunLoop<'_> {
@@ -48,7 +49,7 @@ impl RunLoop<'_> {
 
     /// Writes what the users heard, if that was asked for and there was a frame.
     fn write_audio(&self) -> Result<(), Failure> {
-        let Some(audio) = self.audio.as_ref().filter(|_| self.frames > 0) else { return Ok(()) };
+        let Some(audio) = self.sounds.files.as_ref().filter(|_| self.frames > 0) else { return Ok(()) };
         let said = audio.write()?;
         if self.options.quiet { Ok(()) } else { outputs::say(&(said + "\n")) }
     }
@@ -99,7 +100,8 @@ impl RunLoop<'_> {
             replay: self.replay.as_ref().map(|replay| replay.counts),
             replay_input: self.input_devices.replayed_counts(),
             tracker: self.input_devices.tracker_counts(),
-            sound: self.sound.as_ref().map(|sound| sound.counts),
+            sound: self.sounds.engine.as_ref().map(|engine| engine.counts),
+            played: self.sounds.player.as_ref().map(Player::counts),
             heads_rejected: self.simulation.users.heads_rejected,
             unknown_peers: refused(&self.server.unknown_peers()),
             facets,

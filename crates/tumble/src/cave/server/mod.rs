@@ -13,6 +13,7 @@ mod operator;
 mod outputs;
 mod recording;
 mod serve;
+mod sounds;
 mod start;
 mod summary;
 mod user_audio;

@@ -1,14 +1,13 @@
 //! The frames of a run: simulates, publishes, keeps real time, and serves facets, recording and users.
 
-use super::contact_sound::ContactSound;
 use super::facet_processes::{FacetProcesses, ProcessStatus};
 use super::input_devices::InputDevices;
 use super::live_viewers::LiveViewers;
 use super::operator::{Operator, Wish};
 use super::recording::{RunRecorder, Target};
+use super::sounds::Sounds;
 use super::start::connect_timeout;
 use super::summary::{Metrics, Status};
-use super::user_audio::UserAudio;
 use crate::cave::args::{CaveOptions, ServeOptions};
 use crate::cave::endpoints::ServerEndpoint;
 use crate::cave::replay::frames::Replay;
@@ -56,8 +55,7 @@ pub(super) struct RunLoop<'a> {
     inputs: Vec<(FacetNumber, Input)>,
     pub input_devices: InputDevices,
     live_viewers: LiveViewers,
-    pub sound: Option<ContactSound>,
-    pub audio: Option<UserAudio>,
+    pub sounds: Sounds,
     pub recorder: RunRecorder,
     pub cave: Cave,
     pub scene: String,
@@ -96,11 +94,7 @@ impl<'a> RunLoop<'a> {
         let input_devices = InputDevices::open(options, &cave, hash, replay.is_none())?;
         let live_viewers = LiveViewers::open(options)?;
         let users: Vec<String> = cave.users.iter().map(|user| user.name.clone()).collect();
-        let listened = options.audio.as_deref().zip(options.duration);
-        let audio = listened
-            .map(|(folder, duration)| UserAudio::new(folder, &scene, &users, &simulation.world, duration))
-            .transpose()?;
-        let sound = options.sound.map(|engine| ContactSound::open(engine, users)).transpose()?;
+        let sounds = Sounds::open(options, &scene, users, &simulation.world)?;
         let target = Target::of(options, cave.recording.as_ref(), replay.is_some());
         let recorder = RunRecorder::open(target.as_ref(), &scene.file, hash, &simulation.world, signals)?;
         Ok(RunLoop {
@@ -114,8 +108,7 @@ impl<'a> RunLoop<'a> {
             inputs: Vec::new(),
             input_devices,
             live_viewers,
-            sound,
-            audio,
+            sounds,
             recorder,
             cave,
             scene: scene.file,
@@ -216,17 +209,18 @@ impl<'a> RunLoop<'a> {
         let clock = Instant::now();
         let inputs = std::mem::take(&mut self.inputs);
         self.server.send_inputs(FrameInputs { steps, inputs }).map_err(failed)?;
-        let (sound, audio) = (&mut self.sound, &mut self.audio);
-        let (server, recorder) = (&mut self.server, &mut self.recorder);
+        let (server, recorder, sounds) = (&mut self.server, &mut self.recorder, &mut self.sounds);
         self.simulation.step(steps, |world| {
             server.step(world);
             recorder.step(world);
-            sound.iter_mut().for_each(|sound| sound.step(world));
-            audio.iter_mut().for_each(|audio| audio.step(world));
+            sounds.step(world);
         })?;
         let world = &self.simulation.world;
-        self.sound.iter_mut().for_each(|sound| sound.frame(frame, world, &self.simulation.users.viewer));
-        self.audio.iter_mut().for_each(|audio| audio.frame(&self.simulation.users.viewer));
+        if let Some(said) = self.sounds.frame(frame, world, &self.simulation.users.viewer) {
+            self.operator.log(&said);
+            eprintln!("{said}");
+            self.status.interrupted();
+        }
         self.metrics.step.add(clock.elapsed().as_secs_f64(), frame, world.time());
         divergence::check(world)
     }

@@ -9,6 +9,7 @@ use crate::cave::replay::frames::Counts;
 use crate::cave::replay::replayed_input;
 use crate::cave::tracker::osc;
 use crate::failure::Failure;
+use crate::player;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
@@ -89,6 +90,8 @@ pub struct Summary {
     pub tracker: Option<osc::Counts>,
     /// Datagrams to a sound engine.
     pub sound: Option<contact_sound::Counts>,
+    /// Frames for the outputs of the server's machine.
+    pub played: Option<player::Counts>,
     /// Head poses not applied, because an eye would be behind a screen or in it.
     pub heads_rejected: u64,
     /// Refused packets that belong to no facet, by reason; zero counts are omitted.

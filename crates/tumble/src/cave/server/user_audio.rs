@@ -2,6 +2,7 @@
 //!
 //! A user hears at the head that is tracked, in meters of the scene. All files have one gain, so they can be compared.
 
+use super::sounds::ears as ears_of;
 use crate::atomic_file::write_file;
 use crate::failure::Failure;
 use std::path::{Path, PathBuf};
@@ -50,9 +51,7 @@ impl UserAudio {
     /// Moves the ears to where the users are in a frame whose last step is at the present time.
     pub fn frame(&mut self, viewer: &Viewer) {
         for ((_, ears), user) in self.users.iter_mut().zip(&viewer.users) {
-            let at = viewer.cave * nalgebra::Point3::from(user.head.translation.vector * viewer.scale);
-            let right = viewer.cave.rotation * user.head.rotation * nalgebra::Vector3::x();
-            let listener = Listener { position: at.into(), right: right.into() };
+            let listener = ears_of(viewer, user);
             if ears.last().is_none_or(|(_, last)| *last != listener) {
                 ears.push((self.end, listener));
             }

@@ -25,6 +25,7 @@ use tumble::dynamics::{CameraChange, World, WorldError};
 use tumble::render::winit::event::WindowEvent;
 use tumble::render::{DebugDraw, DrawList, Drawing, Image, Next, Quality, Screen, Shown, WindowApp, caption};
 use tumble::scene::{FileKind, SceneFile, visual_notes};
+use tumble::sound::Listener;
 
 /// Time between two status lines while only the simulation changes.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
@@ -125,10 +126,11 @@ impl Viewer {
         // a robot of a URDF file has no drives and would collapse before it is seen
         let paused = options.paused || (robot && options.duration.is_none());
         let joints = Joints::new(scene, &world);
+        let player = crate::player::wanted(&options.play, scene)?;
         let last = options.duration.map(|s| (s / world.settings().dt).round() as u64);
         Ok(Viewer {
             name: options.scene.name.clone(),
-            simulation_thread: SimulationThread::new(Simulation::new(world, RealTime::new(paused), last)),
+            simulation_thread: SimulationThread::new(Simulation::new(world, RealTime::new(paused), last, player)),
             drawing,
             list,
             view_mode,
@@ -172,7 +174,9 @@ impl Viewer {
 
     /// Updates the draw list to the present state.
     fn update_list(&mut self) -> Result<(), Failure> {
-        let simulation = self.simulation_thread.lock();
+        let mut simulation = self.simulation_thread.lock();
+        let (eye, forward) = (self.user.eye(), self.user.forward());
+        simulation.ears = Listener::looking(eye, [0, 1, 2].map(|k| eye[k] + forward[k]), [0.0, 0.0, 1.0]);
         let world = &simulation.world;
         self.list = self.drawing.list(world, &self.overlays.draw).map_err(|e| Failure::run("the picture", e))?;
         self.drawn = simulation.changes;
