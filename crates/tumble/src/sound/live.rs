@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use tumble_core::World;
 use tumble_scene::SceneFile;
 
-/// Gain at the start, dB: quiet scenes need about as much.
-pub const LIVE_GAIN_DB: f64 = 40.0;
+/// Gain at the start, dB: shipped scenes have their peak at -3 dB of full scale with 11 to 40 dB.
+pub const LIVE_GAIN_DB: f64 = 30.0;
 /// Largest number of strikes of a frame, the loudest, which a mixer renders in real time.
 const MAX_STRIKES: usize = 32;
 
