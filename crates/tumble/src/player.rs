@@ -301,7 +301,7 @@ mod tests {
         let heard = std::fs::read(&file).unwrap();
         std::fs::remove_file(&file).unwrap();
         assert_eq!((counts.player.as_str(), counts.frames + counts.not_heard, counts.left_out), ("dd", 60, 0));
-        assert!(heard.len() > 4 * (LEAD_S * f64::from(RATE_HZ)) as usize && heard.len() % 4 == 0);
+        assert!(heard.len() > 4 * (LEAD_S * f64::from(RATE_HZ)) as usize && heard.len().is_multiple_of(4));
     }
 
     /// A program that reads nothing, or that ends, delays nothing and is said.

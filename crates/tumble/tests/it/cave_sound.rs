@@ -14,7 +14,7 @@ fn a_program_gets_the_sound_of_a_run() {
     assert_eq!((&played["player"], &played["left_out"]), (&"dd".into(), &0.into()));
     // two channels of 16 bits, at 48 kHz
     let heard = std::fs::read(&file).unwrap();
-    assert!(heard.len() % 4 == 0 && heard.len() > 4 * 12_000, "{} bytes", heard.len());
+    assert!(heard.len().is_multiple_of(4) && heard.len() > 4 * 12_000, "{} bytes", heard.len());
     assert!(heard.iter().any(|byte| *byte != 0), "the ball arrives after 0.6 s");
     place.assert_clean();
 }
