@@ -247,7 +247,8 @@ mod tests {
         for _ in 0..60 {
             for _ in 0..4 {
                 world.step().unwrap();
-                (played.step(&world), live.step(&world));
+                played.step(&world);
+                live.step(&world);
             }
             frames.send(played.frame(&EARS)).unwrap();
             let samples = mixer.mix(&live.frame(&EARS));
@@ -316,7 +317,8 @@ mod tests {
         let mut said = Vec::new();
         for _ in 0..240 {
             world.step().unwrap();
-            (stuck.step(&world), gone.step(&world));
+            stuck.step(&world);
+            gone.step(&world);
             assert_eq!(stuck.frame(&EARS), None);
             said.extend(gone.frame(&EARS));
             std::thread::sleep(Duration::from_millis(1));
