@@ -25,7 +25,7 @@ use crate::{Aabb, Vec3};
 /// Distance of the outermost cell beyond the mesh, as a fraction of the diagonal.
 const MARGIN: f64 = 0.05;
 /// Smallest half diagonal of a cell, in mean lengths of an edge.
-const MIN_CELL: f64 = 0.6;
+const MIN_CELL: f64 = 0.15;
 /// Maximum depth.
 const MAX_DEPTH: f64 = 9.0;
 /// Factor that keeps a distance below its exact value when rounded to single precision.
