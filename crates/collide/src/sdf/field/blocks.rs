@@ -94,6 +94,9 @@ impl<'a> Inherited<'a> {
 
     /// Returns the triangles that can be relevant in a cell.
     fn list(&self, center: Vec3, half: f64) -> Vec<NearTriangle> {
+        if let Some(stored) = self.stored {
+            return stored.iter().filter(|t| self.passes(**t)).map(|t| NearTriangle::anywhere(*t)).collect();
+        }
         let mut list = Vec::new();
         if let Some(cell_view) = self.cell_view(center, half) {
             self.each(&cell_view, |t| {
