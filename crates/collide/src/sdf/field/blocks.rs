@@ -211,7 +211,7 @@ impl Blocks {
                 passed_on.extend(Some(t).filter(|t| cell_view.passes_on(triangles, *t)));
                 passed_on.len() <= MAX_STORED
             });
-            let passed_on = Some(passed_on.into()).filter(|passed_on: &Box<[u32]>| passed_on.len() <= MAX_STORED);
+            let passed_on = (passed_on.len() <= MAX_STORED).then(|| passed_on.into_boxed_slice());
             return UpperCell::Divided(Divided { cell_view, passed_on });
         }
         let mut builder = Builder::new(triangles, depth);
