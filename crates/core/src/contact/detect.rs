@@ -122,9 +122,14 @@ struct Found {
 }
 
 impl DetectorBuffers {
-    /// Drops the cached contacts: a frame does not depend on the one before.
+    /// Begins a frame: it does not depend on contacts that are cached in the one before.
     pub fn forget(&mut self) {
         self.narrow_phase_cache.forget();
+    }
+
+    /// Returns whether the last detection found contacts that the start of the next frame can have again.
+    pub fn keeps_contacts(&self) -> bool {
+        self.narrow_phase_cache.keeps_any()
     }
 
     /// Computes the bounds of all parts in the next detection: they may be those of another world.

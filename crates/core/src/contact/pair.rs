@@ -5,10 +5,20 @@
 //! apart (`separation.rs`), and cached within a frame while the poses do not change. Two meshes of
 //! many vertices are not queried with the wide margin that fast bodies need; they are followed
 //! along free motion instead.
+//!
+//! The contacts of two such meshes are also kept from the end of a frame to the start of the next. They are a function of
+//! shapes, poses and margin, and are kept for the same bits of all three, so results do not depend on what is kept. Their
+//! margin is rounded up to a quarter of a power of two (`⌈m⌉` below), so that the margin at the end of a frame is nearly
+//! always that of the start, although forces differ a little:
+//!
+//! ```text
+//! margin = ⌈min(closing, near + 0.05·R)⌉        R: bounding radius of the smaller mesh
+//! ```
 
 use crate::contact::separation::{OrientedBox, are_separated};
 use crate::contact::time_of_impact::{Approach, MovingPair, Search};
 use crate::object::part_state::PartState;
+use std::sync::Arc;
 use tumble_collide::{Aabb, Contact, ContactMode, Pose, Shape, Vec3};
 
 /// Margin of two sphere trees in the `spheres` mode, as a fraction of the smaller bounding radius.
@@ -141,12 +151,23 @@ impl PairQuery<'_> {
         let margin = match (self.parts.mode, self.parts.shapes.map(|shape| shape.has_tree())) {
             // two trees within a wide margin have contacts by the million, so the margin is bounded
             (ContactMode::Spheres, [true, true]) => closing.min(self.near + TREE_MARGIN * size),
-            (ContactMode::Surface, [true, true]) if !self.has_simple_mesh() => {
-                closing.min(self.near + MESH_MARGIN * size)
-            }
+            _ if self.is_of_meshes() => rounded_up(closing.min(self.near + MESH_MARGIN * size)),
             _ => closing,
         };
         (margin, closing)
+    }
+
+    /// Returns whether both shapes have meshes of many corners, whose margin is bounded in the `surface` mode.
+    fn is_of_meshes(&self) -> bool {
+        let have_trees = self.parts.shapes.iter().all(|shape| shape.has_tree());
+        self.parts.mode == ContactMode::Surface && have_trees && !self.has_simple_mesh()
+    }
+
+    /// Returns the shapes if the contacts are a function of shapes, poses and margin that is worth keeping.
+    fn kept_shapes(&self) -> Option<[Shape; 2]> {
+        let MovingPair { tests, filtered, plane, skipped, .. } = &self.parts;
+        let plain = !tests.any() && filtered.is_none() && plane.is_none() && skipped.is_empty();
+        (plain && self.is_of_meshes()).then(|| self.parts.shapes.map(Clone::clone))
     }
 
     /// Returns whether one shape is a mesh of few corners: a wide margin is then cheap, as for a
@@ -175,10 +196,13 @@ impl PairQuery<'_> {
             self.parts.contacts_at(&poses, margin, found);
             return 0.0;
         }
-        if !known.look_up(rows, &poses, margin, found) {
+        let kept = known.look_up(self, rows, &poses, margin, found);
+        if kept.is_none() {
             self.parts.contacts_at(&poses, margin, found);
         }
-        cached.store(rows, poses, margin, found);
+        // the contacts of a wider margin within this one are not exactly those of this one
+        let shapes = if kept.is_none_or(|wider| wider == margin) { self.kept_shapes() } else { None };
+        cached.store(CachedQuery { rows, shapes, poses, margin, end: 0 }, found);
         if !found.is_empty() || self.parts.mode == ContactMode::Spheres || margin >= closing {
             return 0.0;
         }
@@ -198,15 +222,24 @@ impl PairQuery<'_> {
     }
 }
 
-/// Results of the expensive queries of the last detection in this frame.
+/// Returns the next number of the form `k/4·2^n` with `4 ≤ k < 8`, for a positive number.
+fn rounded_up(x: f64) -> f64 {
+    const BELOW: u64 = (1 << 50) - 1;
+    f64::from_bits((x.to_bits() + BELOW) & !BELOW)
+}
+
+/// Results of the expensive queries of the last detection.
 #[derive(Default)]
 pub(crate) struct NarrowPhaseCache {
     last: CachedContacts,
+    /// Whether that detection was in an earlier frame.
+    is_old: bool,
 }
 
 /// Results of the last detection, for pairs in ascending order.
 pub(crate) struct KnownContacts<'a> {
     last: &'a CachedContacts,
+    is_old: bool,
     /// Position in its queries.
     place: usize,
 }
@@ -220,6 +253,9 @@ pub(crate) struct CachedContacts {
 
 struct CachedQuery {
     rows: [u32; 2],
+    /// The shapes, if the contacts are exactly those of the shapes at the poses within the margin, and are kept for the next
+    /// frame.
+    shapes: Option<[Shape; 2]>,
     poses: [Pose; 2],
     margin: f64,
     /// End of its contacts; they start at the end of the previous pair's.
@@ -232,9 +268,10 @@ impl CachedContacts {
         self.contacts.clear();
     }
 
-    fn store(&mut self, rows: [u32; 2], poses: [Pose; 2], margin: f64, found: &[Contact]) {
+    /// Stores the contacts of a query, whose end is set.
+    fn store(&mut self, query: CachedQuery, found: &[Contact]) {
         self.contacts.extend_from_slice(found);
-        self.queries.push(CachedQuery { rows, poses, margin, end: self.contacts.len() });
+        self.queries.push(CachedQuery { end: self.contacts.len(), ..query });
     }
 
     /// Moves the results of later pairs here.
@@ -249,38 +286,76 @@ impl CachedContacts {
 }
 
 impl NarrowPhaseCache {
+    /// Begins a frame, which does not depend on the one before.
     pub fn forget(&mut self) {
-        self.last.clear();
+        self.is_old = true;
+    }
+
+    /// Returns whether contacts of the last detection can be those of the next frame.
+    pub fn keeps_any(&self) -> bool {
+        self.last.queries.iter().any(|query| query.shapes.is_some())
     }
 
     /// Returns the results for pairs from `first` on.
     pub fn from(&self, first: [u32; 2]) -> KnownContacts<'_> {
-        KnownContacts { last: &self.last, place: self.last.queries.partition_point(|k| k.rows < first) }
+        let place = self.last.queries.partition_point(|k| k.rows < first);
+        KnownContacts { last: &self.last, is_old: self.is_old, place }
     }
 
     /// Replaces the results by those of a new detection, in parts of ascending pairs, which are left
     /// empty.
     pub fn replace<'a>(&mut self, parts: impl Iterator<Item = &'a mut CachedContacts>) {
         self.last.clear();
+        self.is_old = false;
         parts.for_each(|part| self.last.append(part));
     }
 }
 
 impl KnownContacts<'_> {
-    /// Writes the cached contacts of a pair to `found`, if neither part has moved and the margin
-    /// was at least as large. Returns whether it did.
-    fn look_up(&mut self, rows: [u32; 2], poses: &[Pose; 2], margin: f64, found: &mut Vec<Contact>) -> bool {
+    /// Writes the cached contacts of a pair to `found`, if neither part has moved and the margin was at least as large; in
+    /// another frame, if everything that they depend on has the same bits. Returns that margin if it did.
+    fn look_up(
+        &mut self,
+        pair: &PairQuery,
+        rows: [u32; 2],
+        poses: &[Pose; 2],
+        margin: f64,
+        found: &mut Vec<Contact>,
+    ) -> Option<f64> {
         let queries = &self.last.queries;
         while queries.get(self.place).is_some_and(|k| k.rows < rows) {
             self.place += 1;
         }
-        let Some(known) = queries.get(self.place).filter(|k| k.rows == rows && k.poses == *poses && k.margin >= margin)
-        else {
-            return false;
+        let is_known = |k: &&CachedQuery| match self.is_old {
+            false => k.rows == rows && k.poses == *poses && k.margin >= margin,
+            true => k.rows == rows && k.margin == margin && k.is_exactly(pair, poses),
         };
+        let known = queries.get(self.place).filter(is_known)?;
         let start = self.place.checked_sub(1).map_or(0, |before| queries[before].end);
         found.extend(self.last.contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
-        true
+        Some(known.margin)
+    }
+}
+
+impl CachedQuery {
+    /// Returns whether the shapes are those of a pair whose contacts are kept, and the poses have the same bits.
+    fn is_exactly(&self, pair: &PairQuery, poses: &[Pose; 2]) -> bool {
+        let bits = |pose: &Pose| {
+            let (place, turn) = (pose.translation.vector, pose.rotation.coords);
+            [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w].map(f64::to_bits)
+        };
+        let (Some(known), Some(now)) = (&self.shapes, pair.kept_shapes()) else { return false };
+        (0..2).all(|k| is_shared(&known[k], &now[k]) && bits(&self.poses[k]) == bits(&poses[k]))
+    }
+}
+
+/// Returns whether two shapes are one mesh, one compound or one cylinder.
+fn is_shared(a: &Shape, b: &Shape) -> bool {
+    match (a, b) {
+        (Shape::Mesh(a), Shape::Mesh(b)) => Arc::ptr_eq(a, b),
+        (Shape::Compound(a), Shape::Compound(b)) => Arc::ptr_eq(a, b),
+        (Shape::Cylinder(a), Shape::Cylinder(b)) => Arc::ptr_eq(a, b),
+        _ => false,
     }
 }
 

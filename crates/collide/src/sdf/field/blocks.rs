@@ -8,11 +8,12 @@
 //! A cell inherits the relevant triangles of its parent ([`super::builder`]), so the cells above a
 //! block are examined first. They are stored too: a divided cell as its [`CellView`], which decides
 //! for each triangle whether it is relevant, an undivided one as the cell that covers all of its
-//! blocks. A tree of boxes finds the triangles close enough to a cell.
+//! blocks. A divided cell also stores the triangles that it passes on, unless they are many; then a
+//! tree of boxes finds the triangles close enough to the cells below.
 
 use super::ListedTriangle;
 use super::builder::{Builder, corner};
-use super::cell_view::{CellView, LONG_LIST, NearTriangle};
+use super::cell_view::{CellView, LONG_LIST, NearTriangle, order};
 use super::octree::Cell;
 use super::triangles::Triangles;
 use crate::Vec3;
@@ -20,6 +21,8 @@ use std::sync::OnceLock;
 
 /// Maximum number of levels above a block.
 const MAX_UPPER_LEVELS: u32 = 5;
+/// Maximum number of triangles that a cell above the blocks stores.
+const MAX_STORED: usize = 4096;
 /// Maximum number of levels within a block that [`Block::top`] skips.
 const MAX_SKIPPED_LEVELS: u32 = 2;
 
@@ -36,7 +39,73 @@ pub(super) struct Block {
 #[derive(Clone, Debug)]
 enum UpperCell {
     Undivided(Cell, Box<[ListedTriangle]>),
-    Divided(CellView),
+    Divided(Divided),
+}
+
+/// A divided cell above the blocks.
+#[derive(Clone, Debug)]
+struct Divided {
+    cell_view: CellView,
+    /// The triangles that it and all cells above it pass on, unless they are many.
+    passed_on: Option<Box<[u32]>>,
+}
+
+/// The triangles that can be relevant in a cell, among those that the cells above it pass on.
+struct Inherited<'a> {
+    /// The triangles that one of these cells stores; `None` if none does.
+    stored: Option<&'a [u32]>,
+    /// The cells below that one, outermost first.
+    above: &'a [&'a Divided],
+    triangles: &'a Triangles,
+}
+
+impl<'a> Inherited<'a> {
+    /// `above` are all cells above a cell, outermost first.
+    fn new(triangles: &'a Triangles, above: &'a [&'a Divided]) -> Inherited<'a> {
+        let last = above.iter().rposition(|divided| divided.passed_on.is_some());
+        let stored = last.and_then(|last| above[last].passed_on.as_deref());
+        Inherited { stored, above: &above[last.map_or(0, |last| last + 1)..], triangles }
+    }
+
+    fn passes(&self, t: u32) -> bool {
+        self.above.iter().rev().all(|divided| divided.cell_view.passes_on(self.triangles, t))
+    }
+
+    /// Returns the view of a cell; `None` if no triangle is relevant there.
+    fn cell_view(&self, center: Vec3, half: f64) -> Option<CellView> {
+        let first = match self.stored {
+            Some(stored) => {
+                let passed = stored.iter().filter(|t| self.passes(**t));
+                passed.map(|t| self.triangles.near(&center, *t)).min_by(order)?
+            }
+            None => self.triangles.closest_near(&center, |t| self.passes(t))?,
+        };
+        Some(CellView::new(self.triangles, center, half, first))
+    }
+
+    /// Calls `each` with the triangles that can be relevant in the cell of a view, until it returns false.
+    fn each(&self, cell_view: &CellView, mut each: impl FnMut(u32) -> bool) {
+        let mut each_passed = |t: u32| !self.passes(t) || each(t);
+        match self.stored {
+            Some(stored) => _ = stored.iter().all(|t| each_passed(*t)),
+            None => self.triangles.each_within(&cell_view.center, cell_view.furthest(self.triangles), each_passed),
+        }
+    }
+
+    /// Returns the triangles that can be relevant in a cell.
+    fn list(&self, center: Vec3, half: f64) -> Vec<NearTriangle> {
+        if let Some(stored) = self.stored {
+            return stored.iter().filter(|t| self.passes(**t)).map(|t| NearTriangle::anywhere(*t)).collect();
+        }
+        let mut list = Vec::new();
+        if let Some(cell_view) = self.cell_view(center, half) {
+            self.each(&cell_view, |t| {
+                list.push(NearTriangle::anywhere(t));
+                true
+            });
+        }
+        list
+    }
 }
 
 /// All blocks of an octree.
@@ -88,13 +157,13 @@ impl Blocks {
     #[inline(never)]
     fn build_block(&self, number: usize, cube: [u32; 3], triangles: &Triangles) -> &Block {
         self.blocks[number].get_or_init(|| {
-            let mut views = Vec::new();
-            let (depth, cells, lists) = match self.upper(cube, triangles, &mut views) {
+            let mut above = Vec::new();
+            let (depth, cells, lists) = match self.upper(cube, triangles, &mut above) {
                 Some((depth, cell, list)) => (depth, vec![*cell], list.to_vec()),
                 None => {
                     let (center, half) = self.cube_bounds(self.level, cube);
                     let mut builder = Builder::new(triangles, self.max_depth);
-                    let list = inherited(triangles, &views, center, half).unwrap_or_default();
+                    let list = Inherited::new(triangles, &above).list(center, half);
                     builder.branch(center, half, &list, &Vec3::zeros(), self.level);
                     (self.level, builder.cells, builder.lists)
                 }
@@ -105,43 +174,48 @@ impl Blocks {
         })
     }
 
-    /// Appends the views of all cells above a block to `views`, outermost first. Stops at an
+    /// Appends all divided cells above a block to `above`, outermost first. Stops at an
     /// undivided cell and returns it with its depth and list.
     fn upper<'a>(
         &'a self,
         cube: [u32; 3],
         triangles: &Triangles,
-        views: &mut Vec<&'a CellView>,
+        above: &mut Vec<&'a Divided>,
     ) -> Option<(u32, &'a Cell, &'a [ListedTriangle])> {
         for depth in 0..self.level {
             let [x, y, z] = cube.map(|digits| digits >> (self.level - depth));
             let number = cells_above_level(depth) + (x | y << depth | z << (2 * depth)) as usize;
-            match self.upper[number].get_or_init(|| self.build_upper_cell(depth, [x, y, z], triangles, views)) {
-                UpperCell::Divided(cell_view) => views.push(cell_view),
+            match self.upper[number].get_or_init(|| self.build_upper_cell(depth, [x, y, z], triangles, above)) {
+                UpperCell::Divided(divided) => above.push(divided),
                 UpperCell::Undivided(cell, list) => return Some((depth, cell, list)),
             }
         }
         None
     }
 
-    /// Builds a cell above the blocks, given the views of the cells above it.
-    fn build_upper_cell(&self, depth: u32, cube: [u32; 3], triangles: &Triangles, views: &[&CellView]) -> UpperCell {
+    /// Builds a cell above the blocks, given the cells above it.
+    fn build_upper_cell(&self, depth: u32, cube: [u32; 3], triangles: &Triangles, above: &[&Divided]) -> UpperCell {
         let (center, half) = self.cube_bounds(depth, cube);
-        let passed = |t: u32| views.iter().rev().all(|cell_view| cell_view.passes_on(triangles, t));
-        let Some(first) = triangles.closest_near(&center, passed) else {
+        let inherited = Inherited::new(triangles, above);
+        let Some(cell_view) = inherited.cell_view(center, half) else {
             return UpperCell::Undivided(Cell::empty(), Box::default());
         };
-        let cell_view = CellView::new(triangles, center, half, first);
         let mut listed = 0;
-        triangles.each_within(&center, cell_view.furthest(triangles), |t| {
-            listed += usize::from(cell_view.lists(triangles, t) && passed(t));
+        inherited.each(&cell_view, |t| {
+            listed += usize::from(cell_view.lists(triangles, t));
             listed <= LONG_LIST
         });
         if cell_view.is_divided(triangles, listed) {
-            return UpperCell::Divided(cell_view);
+            let mut passed_on = Vec::new();
+            inherited.each(&cell_view, |t| {
+                passed_on.extend(Some(t).filter(|t| cell_view.passes_on(triangles, *t)));
+                passed_on.len() <= MAX_STORED
+            });
+            let passed_on = (passed_on.len() <= MAX_STORED).then(|| passed_on.into_boxed_slice());
+            return UpperCell::Divided(Divided { cell_view, passed_on });
         }
         let mut builder = Builder::new(triangles, depth);
-        let list = inherited(triangles, views, center, half).unwrap_or_default();
+        let list = inherited.list(center, half);
         let cell = builder.build_cell(center, half, &list, &Vec3::zeros(), depth, &mut Vec::new());
         UpperCell::Undivided(cell.unwrap_or_else(Cell::empty), builder.lists.into())
     }
@@ -156,21 +230,6 @@ impl Blocks {
         }
         (center, half)
     }
-}
-
-/// Returns the triangles close enough to be relevant in a cell, of those that the cells above pass
-/// on.
-fn inherited(triangles: &Triangles, views: &[&CellView], center: Vec3, half: f64) -> Option<Vec<NearTriangle>> {
-    let passed = |t: u32| views.iter().rev().all(|cell_view| cell_view.passes_on(triangles, t));
-    let cell_view = CellView::new(triangles, center, half, triangles.closest_near(&center, passed)?);
-    let mut list = Vec::new();
-    triangles.each_within(&center, cell_view.furthest(triangles), |t| {
-        if passed(t) {
-            list.push(NearTriangle::anywhere(t));
-        }
-        true
-    });
-    Some(list)
 }
 
 /// Returns the number of cells of all depths above this one.

@@ -25,7 +25,7 @@ use crate::{Aabb, Vec3};
 /// Distance of the outermost cell beyond the mesh, as a fraction of the diagonal.
 const MARGIN: f64 = 0.05;
 /// Smallest half diagonal of a cell, in mean lengths of an edge.
-const MIN_CELL: f64 = 0.6;
+const MIN_CELL: f64 = 0.15;
 /// Maximum depth.
 const MAX_DEPTH: f64 = 9.0;
 /// Factor that keeps a distance below its exact value when rounded to single precision.
@@ -39,13 +39,8 @@ impl Triangles {
     pub fn outermost(&self, bounds: &Aabb) -> (Vec3, f64, u32) {
         let (center, half) =
             (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min).max() + MARGIN * self.diagonal);
-        let lengths: f64 = self.corners.iter().map(|[a, b, _]| (b - a).norm()).sum();
-        let mean = lengths / self.corners.len() as f64;
-        (
-            center,
-            half,
-            nalgebra::ComplexField::log2(3.0_f64.sqrt() * half / (MIN_CELL * mean)).ceil().clamp(1.0, MAX_DEPTH) as u32,
-        )
+        let levels = nalgebra::ComplexField::log2(3.0_f64.sqrt() * half / (MIN_CELL * self.mean_edge)).ceil();
+        (center, half, levels.clamp(1.0, MAX_DEPTH) as u32)
     }
 }
 

@@ -8,6 +8,10 @@ use crate::mesh::closest_on_triangle;
 
 /// Length of a list up to which the cell is not divided.
 pub(super) const SHORT_LIST: usize = 16;
+/// Half diagonal, in mean lengths of an edge, up to which a cell is small, and the length of a list up to which a small cell
+/// is not divided: a mesh of long thin triangles has many of them near most places.
+const SMALL_CELL: f64 = 0.6;
+const SHORT_LIST_OF_SMALL: usize = 32;
 /// Maximum length of a list at the last level, or far from the surface.
 pub(super) const LONG_LIST: usize = 96;
 /// Distance from the surface, in half diagonals, above which a cell is not divided if its list is
@@ -114,7 +118,8 @@ impl CellView {
     /// `listed` can be capped at more than [`LONG_LIST`].
     pub fn is_divided(&self, triangles: &Triangles, listed: usize) -> bool {
         let far = self.first.distance > FAR_FACTOR * self.reach && (listed <= LONG_LIST || self.is_away(triangles));
-        listed > SHORT_LIST && !far
+        let is_small = self.reach <= SMALL_CELL * triangles.mean_edge;
+        listed > (if is_small { SHORT_LIST_OF_SMALL } else { SHORT_LIST }) && !far
     }
 }
 

@@ -29,6 +29,8 @@ pub(super) struct Triangles {
     pub touching: f64,
     /// Diagonal of the mesh, meters.
     pub diagonal: f64,
+    /// Mean length of the edges, meters.
+    pub mean_edge: f64,
     /// Maximum distance beyond the closest face up to which another face can be selected, meters.
     pub around: f64,
 }
@@ -37,8 +39,11 @@ impl Triangles {
     pub fn new(mesh: &TriMesh, groups: &EdgeGroups, searched: Vec<[bool; 3]>) -> Triangles {
         let diagonal = mesh.diagonal();
         let unit = |n: [Vec3; 7]| n.map(|v| v.try_normalize(0.0).unwrap_or_default());
+        let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
+        let lengths: f64 = corners.iter().map(|[a, b, _]| (b - a).norm()).sum();
         Triangles {
-            corners: (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect(),
+            mean_edge: lengths / corners.len() as f64,
+            corners,
             normals: pseudonormals(mesh, groups).into_iter().map(unit).collect(),
             boxes: OnceLock::new(),
             searched,

@@ -26,7 +26,7 @@ use super::TimeStepping;
 use super::lift::{coordinates, coordinates_of};
 use crate::constraint::rows::Block;
 use crate::contact::detect::ContactConstraint;
-use crate::contact::pair::Reach;
+use crate::contact::pair::{PredictionMode, Reach};
 use crate::contact::time_of_impact::pose_after_free_motion;
 use crate::linearize::Switch;
 use crate::object::Level;
@@ -115,15 +115,20 @@ impl TimeStepping {
         }
         let tolerance = core.settings.drift_tolerance;
         let mut reach = FIRST_REACH * tolerance;
+        // where contacts cost much, those that the next step starts with are looked at first: mostly nothing overlaps
+        let ahead = core.detect_scratch.keeps_contacts().then_some(Reach::in_time(h, PredictionMode::Each));
         for _ in 0..ROUNDS {
-            let deepest = self.find_at_end(core, h, reach);
+            let mut deepest = self.find_at_end(core, h, ahead.unwrap_or(Reach::in_place(reach)));
             if !core.branches.take(Switch::Overlap, None, deepest > tolerance) {
                 break;
+            }
+            if ahead.is_some() {
+                deepest = self.find_at_end(core, h, Reach::in_place(reach));
             }
             // also those that the correction may push together
             if PUSHED * deepest > reach {
                 reach = PUSHED * deepest;
-                self.find_at_end(core, h, reach);
+                self.find_at_end(core, h, Reach::in_place(reach));
             }
             build_rows(core, None, &mut self.end, Level::Velocity { h }, 0.0)?;
             let least = LEAST_SWEEPS * self.end.rows.blocks.len();
@@ -178,11 +183,11 @@ impl TimeStepping {
         !core.table.walk.parts.iter().flatten().any(far)
     }
 
-    /// Finds the contacts at the end of a step of `h` seconds within a distance, m. Returns the deepest overlap that is to be
+    /// Finds the contacts at the end of a step of `h` seconds. Returns the deepest overlap that is to be
     /// taken away, m.
-    fn find_at_end(&mut self, core: &mut Core, h: f64, distance: f64) -> f64 {
+    fn find_at_end(&mut self, core: &mut Core, h: f64, within: Reach) -> f64 {
         let report = core.report;
-        detect(core, None, Reach::in_place(distance), &mut self.end.contact_constraints);
+        detect(core, None, within, &mut self.end.contact_constraints);
         core.report = report;
         self.allow_old_overlap(core.settings.recovery_speed * h);
         self.end.contact_constraints.iter().map(|t| -t.contact.gap).fold(0.0, f64::max)
