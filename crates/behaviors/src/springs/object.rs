@@ -180,6 +180,9 @@ impl Integratable for SpringMesh {
             });
         }
     }
+    fn made_for_step(&self) -> Option<f64> {
+        Some(self.step)
+    }
     fn derivative(&self, cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         let mut forces: Vec<Vec3> = f.wrenches.iter().map(|wrench| wrench.force).collect();
         forces.iter_mut().zip(f.generalized.chunks_exact(3)).for_each(|(f, g)| *f += Vec3::from_column_slice(g));

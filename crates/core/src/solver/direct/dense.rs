@@ -150,8 +150,8 @@ fn eliminate(columns: &mut [f64], height: usize, j: usize, (rows, right): (&mut 
     true
 }
 
-/// `to −= factor·from`, eight numbers at a time. Loops and no closures: a closure would be a function of its own, without
-/// the registers of its caller.
+/// `to −= factor·from`, eight numbers at a time. The loops are written out: a function that is passed to an iterator may be compiled
+/// on its own, without the registers of its caller.
 #[inline(always)]
 fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
     let ((to, to_rest), (from, from_rest)) = (to.as_chunks_mut::<8>(), from.as_chunks::<8>());
