@@ -10,8 +10,8 @@
 //! | `P` | order of elimination: nested dissection (George, 1973) by the places of the nodes |
 //! | `G` | lower triangular, by columns of blocks; its pattern is found once |
 
+use super::block::{Block, Columns};
 use crate::error::{BehaviorError, check};
-use nalgebra::Cholesky;
 use tumble_collide::{Mat3, Vec3};
 
 /// Number of nodes that are not divided further.
@@ -38,7 +38,7 @@ pub(super) struct Pattern {
 /// The numbers of a factor.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Factor {
-    blocks: Vec<Mat3>,
+    blocks: Vec<Block>,
 }
 
 impl Pattern {
@@ -100,71 +100,68 @@ impl Pattern {
     /// Clears a factor to the matrix 0.
     pub fn clear(&self, factor: &mut Factor) {
         factor.blocks.clear();
-        factor.blocks.resize(self.row.len(), Mat3::zeros());
+        factor.blocks.resize(self.row.len(), Block::default());
     }
 
     /// Adds a symmetric block for the nodes of a pair and its transpose.
     pub fn add_joined(&self, factor: &mut Factor, pair: usize, block: &Mat3) {
-        factor.blocks[self.joined[pair] as usize] += block;
+        factor.blocks[self.joined[pair] as usize].add(block);
     }
 
     /// Adds a symmetric block for a node.
     pub fn add(&self, factor: &mut Factor, node: usize, block: &Mat3) {
-        factor.blocks[self.first[self.place[node]]] += block;
+        factor.blocks[self.first[self.place[node]]].add(block);
     }
 
     /// Factors the matrix in place. Pivots that are not positive, which rounding alone makes, count as 1.
     pub fn factor(&self, factor: &mut Factor) {
-        let blocks = &mut factor.blocks;
-        let mut updates = self.update.iter();
-        for column in self.first.windows(2) {
-            let (diagonal, below) = (column[0], column[0] + 1..column[1]);
-            let root = Cholesky::new(blocks[diagonal]).map_or_else(Mat3::identity, |root| root.l());
-            blocks[diagonal] = root;
-            let inverse = inverse_lower(&root).transpose();
-            below.clone().for_each(|k| blocks[k] *= inverse);
-            for b in below.clone() {
-                let right = blocks[b].transpose();
-                for (a, target) in (b..below.end).zip(&mut updates) {
-                    let change = blocks[a] * right;
-                    blocks[*target as usize] -= change;
-                }
-            }
-        }
+        pulp::Arch::new().dispatch(Factorization { pattern: self, blocks: &mut factor.blocks });
     }
 
     /// Writes `G⁻¹·b` over `b`, in the order of elimination.
     pub fn solve(&self, factor: &Factor, b: &mut [Vec3]) {
-        // impulses on few nodes leave the columns before them alone
-        let start = b.iter().position(|b| *b != Vec3::zeros()).unwrap_or(b.len());
-        for k in start..b.len() {
-            if b[k] == Vec3::zeros() {
-                continue;
-            }
-            let column = self.first[k]..self.first[k + 1];
-            b[k] = solve_lower(&factor.blocks[column.start], &b[k]);
-            for i in column.skip(1) {
-                let change = factor.blocks[i] * b[k];
-                b[self.row[i]] -= change;
-            }
-        }
+        pulp::Arch::new().dispatch(Forward { pattern: self, blocks: &factor.blocks, b });
     }
 
     /// Writes `G⁻ᵀ·b` over `b`, in the order of elimination.
     pub fn solve_transposed(&self, factor: &Factor, b: &mut [Vec3]) {
-        for k in (0..b.len()).rev() {
-            let column = self.first[k]..self.first[k + 1];
-            let root = &factor.blocks[column.start];
-            let sum = column.skip(1).fold(b[k], |sum, i| sum - factor.blocks[i].tr_mul(&b[self.row[i]]));
-            b[k] = inverse_lower(root).tr_mul(&sum);
+        pulp::Arch::new().dispatch(Backward { pattern: self, blocks: &factor.blocks, b });
+    }
+
+    /// Calls `add` with the places that impulses on a node move and, for each, the part of `G⁻¹·b` there, for up to three
+    /// right-hand sides on that node. `work` is 0 before and after.
+    pub fn respond(
+        &self,
+        factor: &Factor,
+        node: usize,
+        b: Columns,
+        work: &mut Vec<Columns>,
+        mut add: impl FnMut(usize, &Columns),
+    ) {
+        work.resize(self.place.len(), Columns::default());
+        let place = self.place[node];
+        work[place] = b;
+        pulp::Arch::new().dispatch(Response { pattern: self, blocks: &factor.blocks, place, b: work });
+        let mut next = Some(place);
+        while let Some(k) = next {
+            add(k, &std::mem::take(&mut work[k]));
+            next = self.parent(k);
         }
+    }
+
+    /// Returns the next place that the elimination of a place changes: all others that it changes are those that the next ones
+    /// change.
+    #[inline(always)]
+    fn parent(&self, place: usize) -> Option<usize> {
+        let below = self.first[place] + 1..self.first[place + 1];
+        (!below.is_empty()).then(|| self.row[below.start])
     }
 
     /// Writes `Gᵀ·b` over `b`, in the order of elimination.
     pub fn mul_transposed(&self, factor: &Factor, b: &mut [Vec3]) {
         for k in 0..b.len() {
             let column = self.first[k]..self.first[k + 1];
-            b[k] = column.fold(Vec3::zeros(), |sum, i| sum + factor.blocks[i].tr_mul(&b[self.row[i]]));
+            b[k] = column.fold(Vec3::zeros(), |sum, i| sum + factor.blocks[i].matrix().tr_mul(&b[self.row[i]]));
         }
     }
 
@@ -173,8 +170,117 @@ impl Pattern {
         for k in (0..b.len()).rev() {
             let own = std::mem::replace(&mut b[k], Vec3::zeros());
             for i in self.first[k]..self.first[k + 1] {
-                b[self.row[i]] += factor.blocks[i] * own;
+                b[self.row[i]] += factor.blocks[i].matrix() * own;
             }
+        }
+    }
+}
+
+/// A call of [`Pattern::factor`] that is compiled for the widest registers of the processor, as are the following.
+struct Factorization<'a> {
+    pattern: &'a Pattern,
+    blocks: &'a mut [Block],
+}
+
+impl pulp::NullaryFnOnce for Factorization<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Factorization { pattern, blocks } = self;
+        let mut update = 0;
+        for k in 0..pattern.place.len() {
+            let (diagonal, end) = (pattern.first[k], pattern.first[k + 1]);
+            let root = blocks[diagonal].cholesky();
+            blocks[diagonal] = root;
+            let inverse = root.inverse_lower().transposed();
+            for below in &mut blocks[diagonal + 1..end] {
+                *below = below.times(&inverse);
+            }
+            for b in diagonal + 1..end {
+                let right = blocks[b].transposed();
+                let targets = &pattern.update[update..update + end - b];
+                for (a, target) in (b..end).zip(targets) {
+                    let change = blocks[a].times(&right);
+                    blocks[*target as usize].subtract(&change);
+                }
+                update += end - b;
+            }
+        }
+    }
+}
+
+struct Forward<'a> {
+    pattern: &'a Pattern,
+    blocks: &'a [Block],
+    b: &'a mut [Vec3],
+}
+
+impl pulp::NullaryFnOnce for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Forward { pattern, blocks, b } = self;
+        for k in 0..b.len() {
+            if b[k] == Vec3::zeros() {
+                continue;
+            }
+            let (diagonal, end) = (pattern.first[k], pattern.first[k + 1]);
+            b[k] = blocks[diagonal].solve_lower(&b[k]);
+            let own = b[k];
+            for (block, row) in blocks[diagonal + 1..end].iter().zip(&pattern.row[diagonal + 1..end]) {
+                b[*row] -= block.of(&own);
+            }
+        }
+    }
+}
+
+struct Backward<'a> {
+    pattern: &'a Pattern,
+    blocks: &'a [Block],
+    b: &'a mut [Vec3],
+}
+
+impl pulp::NullaryFnOnce for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Backward { pattern, blocks, b } = self;
+        for k in (0..b.len()).rev() {
+            let (diagonal, end) = (pattern.first[k], pattern.first[k + 1]);
+            let mut sum = Columns::of_vector(&b[k]);
+            for (block, row) in blocks[diagonal + 1..end].iter().zip(&pattern.row[diagonal + 1..end]) {
+                sum.subtract_products(block, &b[*row]);
+            }
+            b[k] = blocks[diagonal].inverse_lower().transposed().of(&sum.sums());
+        }
+    }
+}
+
+struct Response<'a> {
+    pattern: &'a Pattern,
+    blocks: &'a [Block],
+    place: usize,
+    b: &'a mut [Columns],
+}
+
+impl pulp::NullaryFnOnce for Response<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Response { pattern, blocks, place, b } = self;
+        let mut next = Some(place);
+        while let Some(k) = next {
+            let (diagonal, end) = (pattern.first[k], pattern.first[k + 1]);
+            let own = b[k].solved_lower(&blocks[diagonal]);
+            b[k] = own;
+            for (block, row) in blocks[diagonal + 1..end].iter().zip(&pattern.row[diagonal + 1..end]) {
+                b[*row].subtract_product(block, &own);
+            }
+            next = pattern.parent(k);
         }
     }
 }
@@ -201,21 +307,6 @@ fn dissect(nodes: &[Vec3], joined: &[Vec<usize>], mut own: Vec<usize>, beyond: &
         dissect(nodes, joined, second, beyond, order);
     }
     order.extend(between);
-}
-
-/// Returns the inverse of a lower triangular block.
-fn inverse_lower(l: &Mat3) -> Mat3 {
-    let [a, b, c] = [l.m11, l.m22, l.m33].map(|x| 1.0 / x);
-    let d = -l.m21 * a * b;
-    let f = -l.m32 * b * c;
-    let e = -(l.m31 * a + l.m32 * d) * c;
-    Mat3::new(a, 0.0, 0.0, d, b, 0.0, e, f, c)
-}
-
-fn solve_lower(l: &Mat3, b: &Vec3) -> Vec3 {
-    let x = b.x / l.m11;
-    let y = (b.y - l.m21 * x) / l.m22;
-    Vec3::new(x, y, (b.z - l.m31 * x - l.m32 * y) / l.m33)
 }
 
 #[cfg(test)]
@@ -264,6 +355,20 @@ mod tests {
         pattern.mul_transposed(&factor, &mut x);
         pattern.mul(&factor, &mut x);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10), "A·A⁻¹·b = b");
+        // three right-hand sides at one node
+        let (node, axes) = (17, [Vec3::new(0.6, 0.0, 0.8), Vec3::y(), Vec3::new(-0.8, 0.0, 0.6)]);
+        let impulses = Columns(std::array::from_fn(|k| [axes[0][k], axes[1][k], axes[2][k], 0.0]));
+        let (mut responses, mut work) = (vec![Columns::default(); n], Vec::new());
+        for _ in 0..2 {
+            pattern.respond(&factor, node, impulses, &mut work, |place, response| responses[place] = *response);
+        }
+        for (axis, v) in axes.iter().enumerate() {
+            let mut b = vec![Vec3::zeros(); n];
+            b[pattern.place[node]] = *v;
+            pattern.solve(&factor, &mut b);
+            let same = |(b, all): (&Vec3, &Columns)| (0..3).all(|k| b[k] == all.0[k][axis]);
+            assert!(b.iter().zip(&responses).all(same), "axis {axis}");
+        }
         assert!(pattern.row.len() < 7 * n, "{} blocks of {}", pattern.row.len(), n * (n + 1) / 2);
     }
 }

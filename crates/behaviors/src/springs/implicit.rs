@@ -18,8 +18,10 @@ const WITH_ONE_FACTOR: usize = 12;
 const HALVINGS: usize = 8;
 /// Number of iterations that a quasi-Newton step remembers.
 const REMEMBERED: usize = 6;
+/// Rounding of the potential, relative to the sum of the sizes of its terms: a step of so little gain is as good as it looks.
+const ROUNDING: f64 = 1e-15;
 /// Change of velocity at which the iteration ends, m/s.
-const CONVERGED: f64 = 1e-10;
+const CONVERGED: f64 = 1e-11;
 
 /// The equation of one step.
 struct Equation<'a> {
@@ -66,7 +68,8 @@ impl SpringMesh {
             let shares = (0..HALVINGS).map(|k| 0.5f64.powi(k as i32));
             let better = shares.map(|share| (tried(share), share)).find_map(|(next, share)| {
                 let next_value = equation.value(&next);
-                (next_value <= value || size * share < CONVERGED).then_some((next, next_value))
+                let falls = next_value.0 <= value.0 + ROUNDING * value.1;
+                (falls || size * share < CONVERGED).then_some((next, next_value))
             });
             let Some((next, next_value)) = better else {
                 if fresh {
@@ -176,18 +179,18 @@ impl Equation<'_> {
         self.ahead.iter().zip(change).map(|(x, dv)| x + lead * dv).collect()
     }
 
-    /// Returns `Φ`.
-    fn value(&self, change: &[Vec3]) -> f64 {
+    /// Returns `Φ` and the sum of the sizes of its terms.
+    fn value(&self, change: &[Vec3]) -> (f64, f64) {
         let (mesh, h, q) = (self.mesh, self.mesh.step, self.places(change));
         let nodes = mesh.masses.iter().zip(change).zip(self.external);
-        let moved: f64 = nodes.map(|((mass, dv), f)| 0.5 * mass * dv.norm_squared() - h * dv.dot(f)).sum();
+        let moved = nodes.map(|((mass, dv), f)| 0.5 * mass * dv.norm_squared() - h * dv.dot(f));
         let springs = mesh.springs.iter().zip(&self.directions).map(|(spring, u)| {
             let [a, b] = spring.nodes;
             let stretch = (q[b] - q[a]).norm() - spring.length;
             let (dv, v) = (u.dot(&(change[b] - change[a])), u.dot(&(self.velocity[b] - self.velocity[a])));
             spring.stiffness / mesh.implicitness * stretch * stretch + h * spring.damping * dv * (v + 0.25 * dv)
         });
-        moved + springs.sum::<f64>()
+        moved.chain(springs).fold((0.0, 0.0), |(sum, size), term| (sum + term, size + term.abs()))
     }
 
     /// Returns `∇Φ`; zero of pinned nodes.

@@ -29,6 +29,7 @@
 //! Limits: made for `time_stepping`. In steps shorter than `h` a mesh is stable and too inert by an error of order
 //! `h²`; in longer ones it may blow up. Nodes of one mesh do not collide with each other.
 
+mod block;
 mod factor;
 mod implicit;
 mod make;

@@ -1,6 +1,7 @@
 //! The traits of objects for the spring mesh.
 
 use super::SpringMesh;
+use super::block::Columns;
 use super::factor::{Factor, Pattern};
 use crate::record;
 use tumble_collide::{Pose, Shape, Vec3};
@@ -20,31 +21,56 @@ pub(super) struct MeshCache {
     pub spare: Factor,
     /// Vectors in the order of elimination.
     work: Vec<Vec3>,
+    /// Responses in the order of elimination, 0 between calls.
+    responses: Vec<Columns>,
 }
 
 impl SpringMesh {
-    /// Does `work` with the pattern, the factor and a vector in the order of elimination, made of `from` and
-    /// written to `to`.
-    fn map(&self, cache: &mut Cache, from: &[f64], to: &mut [f64], work: impl Fn(&Pattern, &Factor, &mut [Vec3])) {
-        let MeshCache { x, factor, made_for, spare, work: vector } = cache.get();
+    /// Makes the factor if there is none for the state, the step and the implicitness.
+    fn make_factor(&self, cache: &mut MeshCache) {
+        let MeshCache { x, factor, made_for, spare, .. } = cache;
         let now = [self.step, self.implicitness];
         if std::mem::replace(made_for, now) != now {
             *spare = factor.take().unwrap_or_else(|| std::mem::take(spare));
         }
-        let factor = factor.get_or_insert_with(|| {
+        factor.get_or_insert_with(|| {
             let mut factor = std::mem::take(spare);
             self.write_factor(x, x, &mut factor);
             factor
         });
-        vector.resize(self.nodes.len(), Vec3::zeros());
-        for (place, from) in self.pattern.place.iter().zip(from.chunks_exact(3)) {
-            vector[*place] = Vec3::from_column_slice(from);
-        }
-        work(&self.pattern, factor, vector);
-        for (place, to) in self.pattern.place.iter().zip(to.chunks_exact_mut(3)) {
-            to.copy_from_slice(vector[*place].as_slice());
-        }
     }
+
+    /// Does `work` with the pattern, the factor and the numbers of all nodes in the order of elimination.
+    fn with_factor(&self, cache: &mut Cache, work: impl FnOnce(&Pattern, &Factor, &mut [Vec3])) {
+        let cache: &mut MeshCache = cache.get();
+        self.make_factor(cache);
+        let MeshCache { factor: Some(factor), work: vector, .. } = cache else { return };
+        vector.resize(self.nodes.len(), Vec3::zeros());
+        work(&self.pattern, factor, vector);
+    }
+}
+
+/// Reads vectors in the order of elimination from numbers in that of the nodes.
+fn read_nodes(pattern: &Pattern, from: &[f64], vectors: &mut [Vec3]) {
+    for (place, from) in pattern.place.iter().zip(from.chunks_exact(3)) {
+        vectors[*place] = Vec3::from_column_slice(from);
+    }
+}
+
+/// Writes them in the order of the nodes.
+fn write_nodes(pattern: &Pattern, vectors: &[Vec3], to: &mut [f64]) {
+    for (place, to) in pattern.place.iter().zip(to.chunks_exact_mut(3)) {
+        to.copy_from_slice(vectors[*place].as_slice());
+    }
+}
+
+/// Reads whitened velocities, which are in the order of elimination.
+fn read_whitened(from: &[f64], vectors: &mut [Vec3]) {
+    vectors.iter_mut().zip(from.chunks_exact(3)).for_each(|(b, from)| *b = Vec3::from_column_slice(from));
+}
+
+fn write_whitened(vectors: &[Vec3], to: &mut [f64]) {
+    vectors.iter().zip(to.chunks_exact_mut(3)).for_each(|(b, to)| to.copy_from_slice(b.as_slice()));
 }
 
 impl Object for SpringMesh {
@@ -106,16 +132,56 @@ impl Integratable for SpringMesh {
         }
     }
     fn mul_l(&self, cache: &mut Cache, v: &[f64], u: &mut [f64]) {
-        self.map(cache, v, u, |pattern, factor, b| pattern.mul_transposed(factor, b));
+        self.with_factor(cache, |pattern, factor, b| {
+            read_nodes(pattern, v, b);
+            pattern.mul_transposed(factor, b);
+            write_whitened(b, u);
+        });
     }
     fn solve_l(&self, cache: &mut Cache, u: &[f64], v: &mut [f64]) {
-        self.map(cache, u, v, |pattern, factor, b| pattern.solve_transposed(factor, b));
+        self.with_factor(cache, |pattern, factor, b| {
+            read_whitened(u, b);
+            pattern.solve_transposed(factor, b);
+            write_nodes(pattern, b, v);
+        });
     }
     fn solve_lt(&self, cache: &mut Cache, j: &[f64], y: &mut [f64]) {
-        self.map(cache, j, y, |pattern, factor, b| pattern.solve(factor, b));
+        self.with_factor(cache, |pattern, factor, b| {
+            read_nodes(pattern, j, b);
+            pattern.solve(factor, b);
+            write_whitened(b, y);
+        });
     }
     fn mul_lt(&self, cache: &mut Cache, u: &[f64], j: &mut [f64]) {
-        self.map(cache, u, j, |pattern, factor, b| pattern.mul(factor, b));
+        self.with_factor(cache, |pattern, factor, b| {
+            read_whitened(u, b);
+            pattern.mul(factor, b);
+            write_nodes(pattern, b, j);
+        });
+    }
+    fn test_impulse(&self, cache: &mut Cache, at: &PartPoint, sign: f64, y: &mut [f64]) {
+        if self.pinned[at.part] {
+            return;
+        }
+        let cache: &mut MeshCache = cache.get();
+        self.make_factor(cache);
+        let MeshCache { factor: Some(factor), responses, .. } = cache else { return };
+        let dof = 3 * self.nodes.len();
+        for (axes, y) in at.axes.chunks(3).zip(y.chunks_mut(3 * dof)) {
+            let axis = |k: usize| axes.get(k).copied().unwrap_or_else(Vec3::zeros);
+            let [a, b, c] = [axis(0), axis(1), axis(2)];
+            let impulses = Columns([[a.x, b.x, c.x, 0.0], [a.y, b.y, c.y, 0.0], [a.z, b.z, c.z, 0.0]]);
+            self.pattern.respond(factor, at.part, impulses, responses, |place, response| {
+                for (k, y) in y.chunks_exact_mut(dof).enumerate() {
+                    for (y, response) in y[3 * place..].iter_mut().zip(&response.0) {
+                        *y += sign * response[k];
+                    }
+                }
+            });
+        }
+    }
+    fn made_for_step(&self) -> Option<f64> {
+        Some(self.step)
     }
     fn derivative(&self, cache: &mut Cache, x: &[f64], f: &ForceSlice, dp: &mut [f64]) {
         let mut forces: Vec<Vec3> = f.wrenches.iter().map(|wrench| wrench.force).collect();

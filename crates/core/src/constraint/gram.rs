@@ -12,7 +12,7 @@
 //! A contact of a soft body moves the nodes that are eliminated after its own: three of four numbers are 0.
 
 /// Numbers of a response that are taken at once.
-const CHUNK: usize = 8;
+const CHUNK: usize = 16;
 
 /// A row and its response.
 pub(super) type Response<'a> = (usize, &'a [f64]);
@@ -35,35 +35,69 @@ impl pulp::NullaryFnOnce for Gram<'_, '_> {
     #[inline(always)]
     fn call(self) {
         let Gram { k, n, responses } = self;
-        let (dof, count) = (responses.first().map_or(0, |(_, y)| y.len()), responses.len());
-        let mut columns = vec![[0.0; CHUNK]; count];
+        let dof = responses.first().map_or(0, |(_, y)| y.len());
+        let (mut places, mut columns) = (Vec::with_capacity(responses.len()), Vec::with_capacity(responses.len()));
         // by number of the chunk, then by row: long runs for the registers
-        let mut by_number = vec![0.0; CHUNK * count];
-        let mut sums = vec![0.0; count];
+        let mut by_number = Vec::with_capacity(CHUNK * responses.len());
+        let mut sums = vec![0.0; 2 * responses.len()];
         for first in (0..dof).step_by(CHUNK) {
             let len = CHUNK.min(dof - first);
-            for (i, (_, y)) in responses.iter().enumerate() {
-                columns[i] = [0.0; CHUNK];
-                columns[i][..len].copy_from_slice(&y[first..first + len]);
-                (0..CHUNK).for_each(|q| by_number[q * count + i] = columns[i][q]);
+            places.clear();
+            columns.clear();
+            for (row, y) in responses {
+                let mut own = [0.0; CHUNK];
+                own[..len].copy_from_slice(&y[first..first + len]);
+                if own != [0.0; CHUNK] {
+                    places.push(*row);
+                    columns.push(own);
+                }
             }
-            for (i, own) in columns.iter().enumerate().filter(|(_, own)| **own != [0.0; CHUNK]) {
-                add_products(&by_number, count, own, &mut sums[..=i]);
-                let row = &mut k[responses[i].0 * n..][..n];
-                sums[..=i].iter().zip(responses).for_each(|(sum, (j, _))| row[*j] += sum);
+            let count = columns.len();
+            by_number.clear();
+            for q in 0..CHUNK {
+                for own in &columns {
+                    by_number.push(own[q]);
+                }
+            }
+            for (pair, own) in columns.chunks(2).enumerate() {
+                let first = 2 * pair;
+                let last = own.len() - 1;
+                let (a, b) = sums.split_at_mut(responses.len());
+                // of a pair of rows both get the products of the second one
+                add_products(
+                    &by_number,
+                    count,
+                    [&own[0], &own[last]],
+                    [&mut a[..=first + last], &mut b[..=first + last]],
+                );
+                for (i, sums) in (first..).zip([a, b]).take(own.len()) {
+                    let row = &mut k[places[i] * n..][..n];
+                    for (sum, place) in sums[..=i].iter().zip(&places) {
+                        row[*place] += sum;
+                    }
+                }
             }
         }
     }
 }
 
-/// Writes `Σ_q own_q·y_jq` for the first rows `j`.
+/// Writes `Σ_q own_q·y_jq` of two rows for the first rows `j`. Numbers of `j` that are read are read once for both.
 #[inline(always)]
-fn add_products(by_number: &[f64], count: usize, own: &[f64; CHUNK], sums: &mut [f64]) {
-    let len = sums.len();
+fn add_products(by_number: &[f64], count: usize, own: [&[f64; CHUNK]; 2], sums: [&mut [f64]; 2]) {
+    let len = sums[0].len();
     let numbers: [&[f64]; CHUNK] = std::array::from_fn(|q| &by_number[q * count..][..len]);
+    let [first, second] = sums;
     for j in 0..len {
-        let pair = |q: usize| own[q] * numbers[q][j] + own[q + 1] * numbers[q + 1][j];
-        sums[j] = (pair(0) + pair(2)) + (pair(4) + pair(6));
+        let (mut even, mut odd) = ([0.0; 2], [0.0; 2]);
+        for q in 0..CHUNK / 2 {
+            let (a, b) = (numbers[2 * q][j], numbers[2 * q + 1][j]);
+            for row in 0..2 {
+                even[row] += own[row][2 * q] * a;
+                odd[row] += own[row][2 * q + 1] * b;
+            }
+        }
+        first[j] = even[0] + odd[0];
+        second[j] = even[1] + odd[1];
     }
 }
 

@@ -209,10 +209,7 @@ impl Rows {
     pub fn apply_block(&self, block: &Block, lambda: &[f64], u: &mut [f64]) {
         for (k, row) in block.range().enumerate() {
             for s in block.sides() {
-                let u = &mut u[s.u as usize..(s.u + s.dof) as usize];
-                for (u, y) in u.iter_mut().zip(self.response(s, k)) {
-                    *u += y * lambda[row];
-                }
+                add_scaled(&mut u[s.u as usize..(s.u + s.dof) as usize], lambda[row], self.response(s, k));
             }
         }
     }
@@ -220,8 +217,7 @@ impl Rows {
     /// Adds `Y·λ` of row `k` of one block to `u`.
     pub(crate) fn push_row(&self, block: &Block, k: usize, lambda: f64, u: &mut [f64]) {
         for s in block.sides() {
-            let u = &mut u[s.u as usize..(s.u + s.dof) as usize];
-            u.iter_mut().zip(self.response(s, k)).for_each(|(u, y)| *u += lambda * y);
+            add_scaled(&mut u[s.u as usize..(s.u + s.dof) as usize], lambda, self.response(s, k));
         }
     }
 
@@ -331,7 +327,53 @@ impl pulp::NullaryFnOnce for Multiplication<'_> {
 }
 
 fn long_dot(a: &[f64], b: &[f64]) -> f64 {
-    sum_long(a, b)
+    if a.len() < WIDE { sum_long(a, b) } else { pulp::Arch::new().dispatch(Product { a, b }) }
+}
+
+/// A product of long responses that is compiled for the widest registers of the processor.
+struct Product<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+}
+
+impl pulp::NullaryFnOnce for Product<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        sum_long(self.a, self.b)
+    }
+}
+
+/// `to += factor·from` of responses.
+#[inline]
+pub(crate) fn add_scaled(to: &mut [f64], factor: f64, from: &[f64]) {
+    let sum = Sum { to, factor, from };
+    if sum.to.len() < WIDE { sum.add() } else { pulp::Arch::new().dispatch(sum) }
+}
+
+struct Sum<'a> {
+    to: &'a mut [f64],
+    factor: f64,
+    from: &'a [f64],
+}
+
+impl Sum<'_> {
+    #[inline(always)]
+    fn add(self) {
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            *to += self.factor * from;
+        }
+    }
+}
+
+impl pulp::NullaryFnOnce for Sum<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.add();
+    }
 }
 
 #[inline(always)]
@@ -339,7 +381,9 @@ fn sum_long(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (a, b) in a.iter().zip(b) {
-        (0..8).for_each(|k| sums[k] += a[k] * b[k]);
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest

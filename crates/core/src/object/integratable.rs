@@ -186,6 +186,12 @@ pub trait Integratable: Object {
         let _ = (cache, part_states, gravity, loads);
         (0, 0.0)
     }
+    /// Returns the length of the steps that the object's rate and mass matrix are made for, s, as those of springs that are
+    /// implicit in time. `backtracking` takes steps of `time_stepping` of this length while such an object moves: no event can be
+    /// located within one. `None` by default: any length will do.
+    fn made_for_step(&self) -> Option<f64> {
+        None
+    }
     /// Returns the reason why the state of the last refresh has no motion (a singular mass matrix).
     /// The step then ends with this as its error.
     fn singularity(&self, cache: &mut Cache) -> Option<String> {

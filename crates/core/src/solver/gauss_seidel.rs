@@ -58,7 +58,7 @@ const FACTORIZATIONS: f64 = 3.0;
 const NEWTON: [u32; 2] = [2, 12];
 const TINY: usize = 4;
 /// The same for an island with a wide object.
-const NEWTON_OF_WIDE: [u32; 3] = [12, 30, 80];
+const NEWTON_OF_WIDE: [u32; 3] = [4, 30, 80];
 
 /// A few sweeps follow a direct solution that is not finished, in islands of at most this number of
 /// blocks.

@@ -4,7 +4,7 @@ use super::dof6::Dof6;
 use super::joint_row::JointRow;
 use super::linkage::{Linkages, SideRange};
 use super::one_contact::{ContactBlock, Symmetric3};
-use crate::constraint::rows::{Block, RowSet, Rows, dot};
+use crate::constraint::rows::{Block, RowSet, Rows, add_scaled, dot};
 use std::cell::Cell;
 use std::ops::Range;
 
@@ -158,8 +158,7 @@ impl Stretch {
     }
 
     fn push(&self, rows: &Rows, delta: f64, du: &mut [f64]) {
-        let du = &mut du[self.u as usize..(self.u + self.len) as usize];
-        du.iter_mut().zip(self.response(rows)).for_each(|(u, y)| *u += delta * y);
+        add_scaled(&mut du[self.u as usize..(self.u + self.len) as usize], delta, self.response(rows));
     }
 }
 
@@ -348,7 +347,7 @@ impl Local {
         for side in sides {
             let (u, dof) = (side.u as usize, side.dof as usize);
             for (y, delta) in y[side.y as usize..].chunks_exact(dof).zip(delta) {
-                du[u..u + dof].iter_mut().zip(y).for_each(|(u, y)| *u += y * delta);
+                add_scaled(&mut du[u..u + dof], *delta, y);
             }
         }
     }

@@ -26,6 +26,10 @@
 //!   frame (but is at most the speed that `a` gives in a frame);
 //! - the sub-step has a floor, and a frame has a cap on tries; beyond it the rest of the frame is
 //!   one time-stepping sub-step. Both are counted as floor hits.
+//!
+//! While an object moves that is made for steps of one length
+//! ([`Integratable::made_for_step`](crate::Integratable::made_for_step)), such as cloth, the whole frame is time-stepping
+//! sub-steps of that length: it has no motion within one in which an event could be located.
 
 use super::adhesion::adhere;
 use super::budget::IMPACTS;
@@ -106,6 +110,12 @@ fn next_length(core: &Core, (h, went): (f64, f64), error: f64) -> f64 {
     h * if went == 0.0 { factor.clamp(0.1, 0.5) } else { factor.clamp(0.5, 2.0) }
 }
 
+/// Returns the shortest length of a step that a moving object is made for, s.
+fn steps_made_for(core: &Core) -> Option<f64> {
+    let moving = core.objects().iter().filter(|entry| entry.moves());
+    moving.filter_map(|entry| entry.object.integratable()?.made_for_step()).min_by(f64::total_cmp)
+}
+
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
 fn is_soft(target: &RowTarget) -> bool {
     target.compliance > 0.0 && !target.inertial
@@ -155,6 +165,12 @@ impl Backtracking {
     fn piece(&mut self, core: &mut Core, end: f64) -> Result<(), StepError> {
         let (dt, most) = (core.settings.dt, TRIES * core.division);
         let mut left = if core.division == 1 { dt } else { end - core.state.time };
+        if let Some(step) = steps_made_for(core) {
+            let count = (left / step).round().max(1.0);
+            (0..count as u32).try_for_each(|_| self.fallback.substep(core, left / count))?;
+            core.state.time = end;
+            return Ok(());
+        }
         let floor = dt * SHORTEST;
         self.slides.solves = 0;
         let mut longest = left;

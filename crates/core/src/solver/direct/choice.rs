@@ -133,7 +133,7 @@ impl Point {
 
     /// Returns `λ − ρ·w`.
     #[inline(always)]
-    fn moved(&self, block: &LocalBlock) -> V3 {
+    pub fn moved(&self, block: &LocalBlock) -> V3 {
         [0, 1, 2].map(|k| self.lambda[k] - self.w[k] / block.diagonal)
     }
 }

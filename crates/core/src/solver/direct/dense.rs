@@ -12,7 +12,7 @@ struct Elimination<'a> {
 }
 
 /// Number of columns that are eliminated before the others follow, which then are read and written once for all of them.
-const PANEL: usize = 4;
+const PANEL: usize = 8;
 
 impl pulp::NullaryFnOnce for Elimination<'_> {
     type Output = bool;
@@ -27,28 +27,41 @@ impl pulp::NullaryFnOnce for Elimination<'_> {
             16..24 => return solve_small::<24>(a, b),
             _ => {}
         }
+        let mut panel = vec![0.0; PANEL * n];
         for first in (0..n).step_by(PANEL) {
             let end = (first + PANEL).min(n);
-            for j in first..end {
-                if !eliminate(a, b, j, end) {
+            let height = n - first;
+            let columns = &mut panel[..(end - first) * height];
+            for (row, a) in a[first * n..].chunks_exact(n).enumerate() {
+                for (column, x) in a[first..end].iter().enumerate() {
+                    columns[column * height + row] = *x;
+                }
+            }
+            for j in 0..end - first {
+                if !eliminate(columns, height, j, (&mut a[first * n..], end), &mut b[first..]) {
                     return false;
                 }
             }
             // the rows of the panel by those above them, then all rows below, in the order of the columns
-            let (panel, below) = a[first * n..].split_at_mut((end - first) * n);
-            for j in 1..end - first {
-                let (above, own) = panel.split_at_mut(j * n);
-                for (k, from) in above.chunks_exact(n).enumerate() {
-                    let factor = own[first + k];
-                    subtract(&mut own[end..n], factor, &from[end..]);
+            let (above, below) = a[first * n..].split_at_mut((end - first) * n);
+            for j in 0..end - first {
+                let (done, own) = above.split_at_mut(j * n);
+                for (k, from) in done.chunks_exact(n).enumerate() {
+                    subtract(&mut own[end..n], columns[k * height + j], &from[end..]);
+                }
+                for k in j..end - first {
+                    own[first + k] = columns[k * height + j];
                 }
             }
             // a panel of fewer columns is the last: nothing is right of it
             if end - first == PANEL {
-                let from: [&[f64]; PANEL] = std::array::from_fn(|k| &panel[k * n + end..(k + 1) * n]);
-                for row in below.chunks_exact_mut(n) {
-                    let (factors, row) = row.split_at_mut(end);
-                    subtract_all(row, std::array::from_fn(|k| factors[first + k]), from);
+                let from: [&[f64]; PANEL] = std::array::from_fn(|k| &above[k * n + end..(k + 1) * n]);
+                for (i, row) in below.chunks_exact_mut(n).enumerate() {
+                    let mut factors = [0.0; PANEL];
+                    for k in 0..PANEL {
+                        factors[k] = columns[k * height + PANEL + i];
+                    }
+                    subtract_all(&mut row[end..], factors, from);
                 }
             }
         }
@@ -88,7 +101,9 @@ fn solve_small<const W: usize>(a: &[f64], b: &mut [f64]) -> bool {
         for row in &mut m[j + 1..n] {
             let factor = row[j] * inverse;
             for start in (first..W).step_by(8) {
-                (start..start + 8).for_each(|k| row[k] -= factor * own[k]);
+                for k in start..start + 8 {
+                    row[k] -= factor * own[k];
+                }
             }
         }
     }
@@ -99,43 +114,51 @@ fn solve_small<const W: usize>(a: &[f64], b: &mut [f64]) -> bool {
     true
 }
 
-/// Brings the largest number of column `j` to the diagonal, writes the factors of the rows below in its place, and
-/// eliminates the column from the columns before `end` and from `b`. Returns `false` if there is no pivot.
+/// Brings the largest number of column `j` of a panel, whose columns have `height` numbers each, to its diagonal,
+/// divides the numbers below by it and eliminates the column from the later ones and from `b`. `rows` are the rows of the matrix, of
+/// which the columns from `right` on follow the exchange. Returns `false` if there is no pivot.
 #[inline(always)]
-fn eliminate(a: &mut [f64], b: &mut [f64], j: usize, end: usize) -> bool {
-    let n = b.len();
-    let mut pivot = j;
-    for i in j + 1..n {
-        if a[i * n + j].abs() > a[pivot * n + j].abs() {
-            pivot = i;
+fn eliminate(columns: &mut [f64], height: usize, j: usize, (rows, right): (&mut [f64], usize), b: &mut [f64]) -> bool {
+    let (mut pivot, mut size) = (j, columns[j * height + j].abs());
+    for (i, x) in columns[j * height..(j + 1) * height].iter().enumerate().skip(j + 1) {
+        if x.abs() > size {
+            (pivot, size) = (i, x.abs());
         }
     }
-    let largest = a[pivot * n + j];
-    if !(largest.abs() > f64::MIN_POSITIVE && largest.is_finite()) {
+    if !(size > f64::MIN_POSITIVE && size.is_finite()) {
         return false;
     }
-    let (above, below) = a.split_at_mut((j + 1) * n);
-    let own = &mut above[j * n..];
     if pivot != j {
-        own.swap_with_slice(&mut below[(pivot - j - 1) * n..][..n]);
+        columns.chunks_exact_mut(height).for_each(|column| column.swap(j, pivot));
+        let n = rows.len() / height;
+        let (above, below) = rows.split_at_mut(pivot * n);
+        above[j * n + right..(j + 1) * n].swap_with_slice(&mut below[right..n]);
         b.swap(j, pivot);
     }
+    let (own, later) = columns[j * height..].split_at_mut(height);
     let inverse = 1.0 / own[j];
-    for (i, row) in below.chunks_exact_mut(n).enumerate() {
-        let factor = row[j] * inverse;
-        row[j] = factor;
-        (j + 1..end).for_each(|k| row[k] -= factor * own[k]);
-        b[j + 1 + i] -= factor * b[j];
+    let factors = &mut own[j + 1..];
+    for factor in &mut *factors {
+        *factor *= inverse;
     }
+    for column in later.chunks_exact_mut(height) {
+        let from = column[j];
+        subtract(&mut column[j + 1..], from, factors);
+    }
+    let from = b[j];
+    subtract(&mut b[j + 1..], from, factors);
     true
 }
 
-/// `to −= factor·from`, four numbers at a time.
+/// `to −= factor·from`, eight numbers at a time. The loops are written out: a function that is passed to an iterator may be compiled
+/// on its own, without the registers of its caller.
 #[inline(always)]
 fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
-    let ((to, to_rest), (from, from_rest)) = (to.as_chunks_mut::<4>(), from.as_chunks::<4>());
+    let ((to, to_rest), (from, from_rest)) = (to.as_chunks_mut::<8>(), from.as_chunks::<8>());
     for (to, from) in to.iter_mut().zip(from) {
-        *to = [0, 1, 2, 3].map(|k| to[k] - factor * from[k]);
+        for k in 0..8 {
+            to[k] -= factor * from[k];
+        }
     }
     for (to, from) in to_rest.iter_mut().zip(from_rest) {
         *to -= factor * from;
@@ -145,21 +168,24 @@ fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
 /// As [`subtract`], of one row after the other.
 #[inline(always)]
 fn subtract_all(to: &mut [f64], factors: [f64; PANEL], from: [&[f64]; PANEL]) {
-    const WIDTH: usize = 8;
     let len = to.len();
     let from = from.map(|from| &from[..len]);
-    let whole = len / WIDTH * WIDTH;
-    for start in (0..whole).step_by(WIDTH) {
-        let mut sum = [0.0; WIDTH];
-        sum.copy_from_slice(&to[start..start + WIDTH]);
+    let (to, rest) = to.as_chunks_mut::<8>();
+    let whole = 8 * to.len();
+    for (i, to) in to.iter_mut().enumerate() {
+        let mut sum = *to;
         for (factor, from) in factors.iter().zip(from) {
-            let from = &from[start..start + WIDTH];
-            (0..WIDTH).for_each(|k| sum[k] -= factor * from[k]);
+            let from = &from[8 * i..8 * i + 8];
+            for k in 0..8 {
+                sum[k] -= factor * from[k];
+            }
         }
-        to[start..start + WIDTH].copy_from_slice(&sum);
+        *to = sum;
     }
-    for k in whole..len {
-        to[k] = factors.iter().zip(from).fold(to[k], |to, (factor, from)| to - factor * from[k]);
+    for (k, to) in rest.iter_mut().enumerate() {
+        for (factor, from) in factors.iter().zip(from) {
+            *to -= factor * from[whole + k];
+        }
     }
 }
 
@@ -174,7 +200,7 @@ mod tests {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         };
-        for n in (1..20).chain([61, 128]) {
+        for n in (1..40).chain([61, 128, 291]) {
             let (a, x): (Vec<f64>, Vec<f64>) =
                 ((0..n * n).map(|_| random()).collect(), (0..n).map(|_| random()).collect());
             let mut b: Vec<f64> = a.chunks_exact(n).map(|row| row.iter().zip(&x).map(|(a, x)| a * x).sum()).collect();

@@ -29,6 +29,7 @@ mod lu;
 mod multipliers;
 mod newton;
 mod proximal;
+mod sliding;
 mod structure;
 
 use crate::constraint::rows::{RowSet, Rows};

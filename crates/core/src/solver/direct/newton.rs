@@ -28,6 +28,7 @@ use super::cone::length;
 use super::dense;
 use super::island::{Island, Kind, LocalBlock, largest};
 use super::multipliers::Multipliers;
+use super::sliding::Sliding;
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, multiply};
 use std::ops::Range;
@@ -70,6 +71,9 @@ pub(in crate::solver) struct SmallIsland<'a> {
     /// Rows of the normal forces that each bound follows, with the factors `a`.
     bounds: Vec<Vec<(usize, f64)>>,
     memory: Memory,
+    sliding: Sliding,
+    /// With more coupled rows than this, contacts that slide have fewer unknowns (`sliding.rs`).
+    fewer_from: usize,
 }
 
 /// Equations of the coupled rows.
@@ -150,7 +154,20 @@ impl<'a> SmallIsland<'a> {
             k: rows.dense(blocks),
             bounds: Vec::new(),
             memory: Memory::default(),
+            sliding: Sliding::default(),
+            fewer_from: MAX_ROWS.0,
         })
+    }
+
+    /// Returns the change of the multipliers in one step, with all unknowns or with fewer; `None` if there is none.
+    #[cfg(test)]
+    pub fn step_for_test(&mut self, lambda: &[f64], fewer: bool) -> Option<Vec<f64>> {
+        self.fewer_from = if fewer { 0 } else { usize::MAX };
+        let (at, mut choices, mut change) = (self.at(lambda.to_vec()), Vec::new(), Iterate::default());
+        self.choose(&at, &mut choices);
+        let slide = choices.iter().filter(|choice| **choice == Choice::Slide).count();
+        assert!(slide > 10 && slide + 10 < choices.len(), "{slide} slide");
+        self.change(&at, &choices, REGULAR[0], &mut change).then_some(change.lambda)
     }
 
     /// Sets the number of bounds that follow normal forces.
@@ -463,6 +480,15 @@ impl<'a> SmallIsland<'a> {
             }
         }
         let n = coupled.len();
+        if n > self.fewer_from && self.bounds.is_empty() {
+            let with_choice = island.blocks.iter().zip(choices).filter(|(_, choice)| choice.is_coupled());
+            let blocks = with_choice.map(|(block, choice)| (block, at.point(block), *choice));
+            let solved = self.sliding.change(blocks, k, epsilon, lambda);
+            if solved {
+                self.multiply(change);
+            }
+            return solved;
+        }
         matrix.clear();
         matrix.resize(n * n, 0.0);
         right.clear();
