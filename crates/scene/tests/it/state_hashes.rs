@@ -50,14 +50,14 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "5a07a31e6f96f3f8";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "177b70cbfeccbaf8";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fa6178513e41a74b";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "ea0943289d02ada4";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
     chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";
-    falling_time_stepping: "falling", TimeStepping, "b7daa548462f5142", "7cae47a62c963de7";
+    falling_time_stepping: "falling", TimeStepping, "e612a5a33bb789d4", "5a7e24fe006f5bf6";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "541c5f168d0c3553", "6ec9bd1e500b65f3";
+    falling_backtracking: "falling", Backtracking, "56e2144218680e99", "57e7414b05aa686d";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -94,18 +94,18 @@ table! {
     arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "17736b4a409409d7";
     walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "6e69fb4e45ddca89";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "dd93b3ba2f28eb55";
-    mechanism_time_stepping: "mechanism", TimeStepping, "5b4d12d63f4d7f7e", "7185e7c6f3855768";
+    mechanism_time_stepping: "mechanism", TimeStepping, "693bdfa98885bbc3", "f5e6d678c34b6cf3";
     dominoes_time_stepping: "dominoes", TimeStepping, "3e999483436aff8f", "bc6eb97a7494a75e";
 }
 
 table! {
     [0.1, 0.3];
-    cloth_time_stepping: "cloth", TimeStepping, "6b8af320d69ac658", "dde505f9a4346cd5";
-    cloth_backtracking: "cloth", Backtracking, "645053291a4cb2e0", "a29199d1e97be98d";
-    jelly_time_stepping: "jelly", TimeStepping, "fb98edf8419e0514", "1a7816c1e1d6a3a6";
+    cloth_time_stepping: "cloth", TimeStepping, "193dfd785230acaf", "bbcac9a19c91cf5a";
+    cloth_backtracking: "cloth", Backtracking, "193dfd785230acaf", "bbcac9a19c91cf5a";
+    jelly_time_stepping: "jelly", TimeStepping, "58432d5e1831dfb4", "6d8fb706aa558611";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
-    mechanism_backtracking: "mechanism", Backtracking, "606256fe05e92405", "199a060ec701269e";
+    mechanism_backtracking: "mechanism", Backtracking, "6b095cfe81cdb322", "d2b76cc6ba303bf6";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "be3e16a61a93cd6a", "9121e031bf023833";
 }
