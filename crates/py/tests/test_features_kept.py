@@ -40,6 +40,7 @@ NOT_IN_A_WORLD = {
     "videos",
     "animations that play without a kernel",
     "the sound of contacts as a file",
+    "the sound of contacts while a scene runs",
     "a window on a program's world",
     "images without a window",
     "several screens around a user",
