@@ -15,6 +15,8 @@ const PROJECTIONS: usize = 16;
 /// have, as a fraction of the smaller radius.
 const MAX_TRANSLATIONS: usize = 16;
 const CLEARANCE: f64 = 1e-2;
+/// Distance of two surfaces that touch or cross, in smaller radii: a point of both has at most a distance of rounding.
+const TOUCHING: f64 = 1e-12;
 
 /// Returns the closest points of two bounded shapes that are no compounds, or else, if they
 /// overlap or touch, a pair of points where they do: at minus the depth if that is exact, else at distance 0.
@@ -25,21 +27,8 @@ pub(super) fn apart(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Resul
         let found = separation(a, b, &start, f64::INFINITY);
         return pair_of(&found, [a.radius, b.radius], &start);
     }
-    let start = projected(a, pose_a, b, pose_b);
-    let mut search = Search { best: start, crosses: false };
-    let [of_a, of_b] = [(a, pose_a), (b, pose_b)].map(|(shape, pose)| surface(shape, pose));
-    match (&cores, of_a, of_b) {
-        ([None, None], Some(x), Some(y)) => search.meshes(&x, 0, &y, 0),
-        ([None, Some(core)], Some(x), _) => search.mesh_and_core(&x, 0, core, false),
-        ([Some(core), None], _, Some(y)) => search.mesh_and_core(&y, 0, core, true),
-        _ => {}
-    }
-    let best = search.best;
-    // surfaces that do not cross: one solid is within the other, or a shell of it is
+    let best = surfaces_apart(a, pose_a, b, pose_b)?;
     let within = |shape: &Shape, pose: &Pose, p: &Vec3| shape.closest_point(pose, p).distance < 0.0;
-    if search.crosses || within(a, pose_a, &best.points[1]) || within(b, pose_b, &best.points[0]) {
-        return Err(ClosestPair { distance: 0.0, ..best });
-    }
     let shells = |shape: &Shape| if let Shape::Mesh(mesh) = shape { mesh.report().shells } else { 1 };
     if shells(a).max(shells(b)) > 1 {
         let mut found = Vec::new();
@@ -52,6 +41,30 @@ pub(super) fn apart(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Resul
         }) {
             return Err(ClosestPair { distance: 0.0, ..best });
         }
+    }
+    Ok(best)
+}
+
+/// Returns the closest points of two shapes of which at least one is a mesh, or else, if their surfaces cross
+/// or the closest points are inside the other solid, a pair of points at distance 0. The solids may
+/// still overlap if a mesh has several shells.
+pub(crate) fn surfaces_apart(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose) -> Result<ClosestPair, ClosestPair> {
+    let cores = [Core::of(a, pose_a), Core::of(b, pose_b)];
+    let start = projected(a, pose_a, b, pose_b);
+    let mut search = Search { best: start, crosses: false };
+    let [of_a, of_b] = [(a, pose_a), (b, pose_b)].map(|(shape, pose)| surface(shape, pose));
+    match (&cores, of_a, of_b) {
+        ([None, None], Some(x), Some(y)) => search.meshes(&x, 0, &y, 0),
+        ([None, Some(core)], Some(x), _) => search.mesh_and_core(&x, 0, core, false),
+        ([Some(core), None], _, Some(y)) => search.mesh_and_core(&y, 0, core, true),
+        _ => {}
+    }
+    let best = search.best;
+    // surfaces that do not cross: one solid is within the other, or a shell of it is
+    let within = |shape: &Shape, pose: &Pose, p: &Vec3| shape.closest_point(pose, p).distance < 0.0;
+    let touches = best.distance <= TOUCHING * a.bounding_radius().min(b.bounding_radius());
+    if touches || search.crosses || within(a, pose_a, &best.points[1]) || within(b, pose_b, &best.points[0]) {
+        return Err(ClosestPair { distance: 0.0, ..best });
     }
     Ok(best)
 }

@@ -7,6 +7,7 @@ mod point;
 mod solid;
 
 use crate::{Aabb, Contact, Pose, Shape, Vec3, contacts};
+pub(crate) use apart::surfaces_apart;
 use apart::{above_plane, apart, least_translation};
 use solid::Core;
 

@@ -10,6 +10,7 @@ mod curved;
 mod cylinder;
 mod half_space;
 mod parts;
+mod push_out;
 mod reduce;
 mod rounded;
 mod sdf_contact;
@@ -22,6 +23,7 @@ use crate::sdf::curved::{ConeField, EllipsoidField};
 use crate::sdf::primitive::{BoxField, CylinderField, HalfSpaceField, RoundField};
 use crate::shape::Cone;
 use crate::{Contact, ContactMode, Pose, Shape, SurfacePoint, Vec3};
+use push_out::Place;
 use sdf_contact::{Body, BodyElements};
 
 /// Calls [`contacts_in_mode`] with the default mode, `surface`.
@@ -53,6 +55,27 @@ pub fn contacts_in_mode(
     if let Some(side) = compound::Side::of(a, b) {
         return compound::contacts_of_compound(side, mode, (a, pose_a), (b, pose_b), margin, out);
     }
+    let first = out.len();
+    let push_out = |place: Place, out: &mut Vec<Contact>| {
+        mode == ContactMode::Surface && push_out::push_out(place, (a, pose_a), (b, pose_b), margin, out)
+    };
+    if push_out(Place::Center, out) {
+        return;
+    }
+    contacts_without_push(mode, (a, pose_a), (b, pose_b), margin, out);
+    if out.len() == first {
+        push_out(Place::Axis, out);
+    }
+}
+
+/// Appends the contacts of two shapes, both without parts, by their elements and surfaces alone.
+fn contacts_without_push(
+    mode: ContactMode,
+    (a, pose_a): (&Shape, &Pose),
+    (b, pose_b): (&Shape, &Pose),
+    margin: f64,
+    out: &mut Vec<Contact>,
+) {
     if a.is_rounded() || b.is_rounded() {
         return rounded::contacts_of_rounded(mode, (a, pose_a), (b, pose_b), margin, out);
     }

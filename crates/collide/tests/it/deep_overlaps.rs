@@ -8,11 +8,11 @@ use parry3d_f64::query;
 use parry3d_f64::shape::{Capsule, Cuboid, Cylinder, Shape as ParryShape};
 use tumble_collide::{CompoundPart, Contact, Pose, Quat, Shape, TreeSettings, TriMesh, Vec3, contacts};
 
-fn slow() -> bool {
+pub fn slow() -> bool {
     std::env::var_os("TUMBLE_SLOW").is_some()
 }
 
-fn mesh(mesh: &TriMesh) -> Shape {
+pub fn mesh(mesh: &TriMesh) -> Shape {
     Shape::mesh(mesh.clone(), &TreeSettings::octree()).unwrap()
 }
 
@@ -46,7 +46,7 @@ fn dumbbell() -> Shape {
     Shape::compound(vec![part(bar, 0.0), part(ball, 0.4), part(block, -0.4)]).unwrap()
 }
 
-fn shapes() -> Vec<(&'static str, Shape)> {
+pub fn shapes() -> Vec<(&'static str, Shape)> {
     let spool = [(0.0, -0.5), (0.5, -0.5), (0.2, -0.1), (0.2, 0.1), (0.5, 0.5), (0.0, 0.5)];
     vec![
         ("half-space", Shape::half_space()),
@@ -170,7 +170,7 @@ fn contacts_of_deep_overlaps_lie_at_both_bodies_full_length() {
 }
 
 /// Returns the least translation over directions on a spiral, improved locally.
-fn least_translation(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> f64 {
+pub fn least_translation(a: &Shape, pa: &Pose, b: &Shape, pb: &Pose) -> f64 {
     let count = 2000;
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let direction = |i: usize| {

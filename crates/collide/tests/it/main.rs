@@ -41,6 +41,7 @@ mod reader_fuzz;
 mod rng;
 mod shape_cache;
 mod shared_meshes;
+mod smooth_in_concave;
 mod smooth_shapes;
 mod surface;
 mod surface_parry;

@@ -7,11 +7,9 @@
 //! A track that is written has one gain, from its peak. The peak of a run that goes on is unknown, so the gain falls when a
 //! sample would exceed full scale, and never rises: the proportions stay from then on.
 
-use super::mix::Canvas;
-use super::voices::Noise;
+use super::mix::Renderer;
 use super::wav::CEILING;
 use super::{Listener, RATE_HZ, Rub, Soundtrack, Strike};
-use std::collections::BTreeMap;
 use tumble_core::World;
 use tumble_scene::SceneFile;
 
@@ -83,8 +81,7 @@ impl LiveSound {
 
 /// Renders the frames of a [`LiveSound`].
 pub struct LiveMixer {
-    canvas: Canvas,
-    noises: BTreeMap<u64, Noise>,
+    renderer: Renderer,
     gain: f64,
 }
 
@@ -92,24 +89,18 @@ impl LiveMixer {
     /// Begins with a gain, dB.
     pub fn new(gain_db: f64) -> LiveMixer {
         let gain = libm::pow(10.0, gain_db / 20.0);
-        LiveMixer { canvas: Canvas::default(), noises: BTreeMap::new(), gain }
+        LiveMixer { renderer: Renderer::default(), gain }
     }
 
     /// Returns the samples of both ears from the end of the last frame to the end of this one; 1 is full scale, with the gain.
     pub fn mix(&mut self, frame: &LiveFrame) -> Vec<[f64; 2]> {
         if frame.restarted {
-            (self.canvas, self.noises) = (Canvas::default(), BTreeMap::new());
+            self.renderer = Renderer::default();
         }
-        for strike in &frame.strikes {
-            self.canvas.add(&frame.ears, strike.time, strike.point, &strike.samples());
-        }
-        for (number, rub) in &frame.rubs {
-            let noise = self.noises.entry(*number).or_insert_with(|| Noise::new(*number));
-            self.canvas.add(&frame.ears, rub.time, rub.point, &rub.samples(noise));
-        }
+        self.renderer.add(&frame.strikes, &frame.rubs, |_| frame.ears);
         // the times of two frames that meet differ by rounding, so the last sample waits
         let end = (frame.end * f64::from(RATE_HZ)).floor() as usize;
-        let mut samples = self.canvas.take(end.saturating_sub(1));
+        let mut samples = self.renderer.canvas.take(end.saturating_sub(1));
         let peak = samples.iter().flatten().fold(0.0, |most: f64, sample| most.max(sample.abs()));
         if peak * self.gain > CEILING {
             self.gain = CEILING / peak;

@@ -7,6 +7,9 @@
 //! `s` is the sine of the angle from the middle: −1 at the left, 1 at the right. The sum of the squares of both ears does
 //! not depend on it. Sources are where the contact was; the Doppler effect is left out.
 
+use super::voices::Noise;
+use super::{Rub, Strike};
+use std::collections::BTreeMap;
 use tumble_scene::SceneFile;
 
 /// Samples per second.
@@ -89,5 +92,25 @@ impl Canvas {
         }
         self.taken += count;
         self.samples.drain(..count).collect()
+    }
+}
+
+/// Renders strikes and rubs; the noise of a pair that rubs goes on from one call to the next.
+#[derive(Default)]
+pub(super) struct Renderer {
+    pub canvas: Canvas,
+    noises: BTreeMap<u64, Noise>,
+}
+
+impl Renderer {
+    /// Adds sounds, each heard from where the listener is at its time, s.
+    pub fn add(&mut self, strikes: &[Strike], rubs: &[(u64, Rub)], ears: impl Fn(f64) -> Listener) {
+        for strike in strikes {
+            self.canvas.add(&ears(strike.time), strike.time, strike.point, &strike.samples());
+        }
+        for (number, rub) in rubs {
+            let noise = self.noises.entry(*number).or_insert_with(|| Noise::new(*number));
+            self.canvas.add(&ears(rub.time), rub.time, rub.point, &rub.samples(noise));
+        }
     }
 }

@@ -1,8 +1,7 @@
 //! Collects what sounds from a world, frame by frame.
 
-use super::mix::Canvas;
+use super::mix::Renderer;
 use super::parts::Chosen;
-use super::voices::Noise;
 use super::{Listener, MAX_SECONDS, Mixed, RATE_HZ, Rub, SoundBody, SoundError, SoundMaterial, Strike};
 use std::collections::BTreeMap;
 use tumble_core::collide::Vec3;
@@ -195,17 +194,11 @@ impl Soundtrack {
             0 => first.1,
             n => ears[n - 1].1,
         };
-        let mut canvas = Canvas::default();
-        for strike in &self.strikes {
-            canvas.add(&at(strike.time), strike.time, strike.point, &strike.samples());
-        }
-        let mut noises: BTreeMap<u64, Noise> = BTreeMap::new();
-        for (number, rub) in &self.rubs {
-            let noise = noises.entry(*number).or_insert_with(|| Noise::new(*number));
-            canvas.add(&at(rub.time), rub.time, rub.point, &rub.samples(noise));
-        }
-        canvas.samples.resize(((end + 1.0) * f64::from(RATE_HZ)).ceil().max(0.0) as usize, [0.0; 2]);
-        Ok(Mixed { samples: canvas.samples })
+        let mut renderer = Renderer::default();
+        renderer.add(&self.strikes, &self.rubs, at);
+        let mut samples = renderer.canvas.samples;
+        samples.resize(((end + 1.0) * f64::from(RATE_HZ)).ceil().max(0.0) as usize, [0.0; 2]);
+        Ok(Mixed { samples })
     }
 
     /// Takes what was collected, with the time of the world, s, as seconds after the start of the first frame.

@@ -448,7 +448,7 @@ fn mesh_normals(mesh: &MeshField, visit: &mut dyn FnMut(Vec3)) {
 
 impl BodyElements<'_> {
     /// Returns the support function: the maximum of `n·x` over the body.
-    pub(super) fn support(&self, n: &Vec3) -> f64 {
+    pub(in crate::narrow) fn support(&self, n: &Vec3) -> f64 {
         match self {
             BodyElements::Mesh(elements) => elements.support(n).dot(n),
             BodyElements::Box(half) => half.dot(&n.abs()),
