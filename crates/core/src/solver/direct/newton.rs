@@ -23,14 +23,18 @@
 //! Feet that are braced against each other need that: there `|f|` has minima that are no solutions. Other methods solve
 //! the rest.
 
-use super::choice::{Choice, Derivative, Point};
+mod equations;
+mod iterate;
+
+use super::choice::{Choice, Point};
 use super::cone::length;
-use super::dense;
 use super::island::{Island, Kind, LocalBlock, largest};
 use super::multipliers::Multipliers;
 use super::sliding::Sliding;
 use super::{Direct, Tolerance, work_of_blocks};
 use crate::constraint::rows::{Rows, multiply};
+use equations::Memory;
+use iterate::Iterate;
 use std::ops::Range;
 
 /// Maximum number of rows of an island, and of one with a wide object, of which a sweep costs nearly as much as a step
@@ -74,56 +78,6 @@ pub(in crate::solver) struct SmallIsland<'a> {
     sliding: Sliding,
     /// With more coupled rows than this, contacts that slide have fewer unknowns (`sliding.rs`).
     fewer_from: usize,
-}
-
-/// Equations of the coupled rows.
-#[derive(Default)]
-struct Memory {
-    coupled: Vec<usize>,
-    matrix: Vec<f64>,
-    right: Vec<f64>,
-    /// The same rows as stretches: the first of each and their number.
-    stretches: Vec<[usize; 2]>,
-    /// `(K + R)·δλ` of the rows that are not coupled.
-    pulled: Vec<f64>,
-    /// Place of each row among the coupled ones; filled if bounds follow normal forces.
-    places: Vec<Option<usize>>,
-}
-
-/// Multipliers and row velocities of the island.
-#[derive(Clone, Default)]
-struct Iterate {
-    lambda: Vec<f64>,
-    w: Vec<f64>,
-    /// Bounds that follow normal forces; negative ones count as 0.
-    bounds: Vec<f64>,
-}
-
-impl Iterate {
-    #[inline(always)]
-    fn point(&self, block: &LocalBlock) -> Point {
-        let bound = block.bound.map_or(0.0, |bound| self.bounds[bound as usize].max(0.0));
-        let mut point = Point { bound, ..Point::default() };
-        point.lambda[..block.rows].copy_from_slice(&self.lambda[block.range()]);
-        point.w[..block.rows].copy_from_slice(&self.w[block.range()]);
-        point
-    }
-
-    /// Returns a block after `t` of a change.
-    #[inline(always)]
-    fn point_along(&self, change: &Iterate, t: f64, block: &LocalBlock) -> Point {
-        let along = |bound: u32| self.bounds[bound as usize] + t * change.bounds[bound as usize];
-        let bound = block.bound.map_or(0.0, |bound| along(bound).max(0.0));
-        let (at, change) = (self.point(block), change.point(block));
-        let add = |x: [f64; 3], d: [f64; 3]| [0, 1, 2].map(|k| x[k] + t * d[k]);
-        Point { lambda: add(at.lambda, change.lambda), w: add(at.w, change.w), bound }
-    }
-
-    fn advance(&mut self, change: &Iterate, t: f64) {
-        self.lambda.iter_mut().zip(&change.lambda).for_each(|(x, d)| *x += t * d);
-        self.w.iter_mut().zip(&change.w).for_each(|(x, d)| *x += t * d);
-        self.bounds.iter_mut().zip(&change.bounds).for_each(|(x, d)| *x += t * d);
-    }
 }
 
 /// The best multipliers so far.
@@ -454,101 +408,6 @@ impl<'a> SmallIsland<'a> {
             f[0] * f[0] + f[1] * f[1] + f[2] * f[2]
         };
         self.island.blocks.iter().zip(choices).map(square).sum::<f64>().sqrt()
-    }
-
-    /// Writes the change that makes the linearized function 0. Returns whether there is one.
-    fn change(&mut self, at: &Iterate, choices: &[Choice], epsilon: f64, change: &mut Iterate) -> bool {
-        let Memory { coupled, stretches, matrix, right, pulled, places } = &mut self.memory;
-        let (island, k, count) = (&self.island, &self.k, self.island.c.len());
-        let lambda = &mut change.lambda;
-        lambda.clear();
-        lambda.resize(count, 0.0);
-        coupled.clear();
-        stretches.clear();
-        let is_coupled = |block: &LocalBlock, choice: &Choice| choice.is_coupled() || block.bound.is_some();
-        for (block, choice) in island.blocks.iter().zip(choices) {
-            if is_coupled(block, choice) {
-                coupled.extend(block.range());
-                match stretches.last_mut() {
-                    Some([first, len]) if *first + *len == block.row => *len += block.rows,
-                    _ => stretches.push([block.row, block.rows]),
-                }
-            } else {
-                let f = at.point(block).function(block, *choice);
-                let scale = -1.0 / ((1.0 + epsilon) * block.diagonal.max(f64::MIN_POSITIVE));
-                lambda[block.range()].iter_mut().zip(f).for_each(|(x, f)| *x = scale * f);
-            }
-        }
-        let n = coupled.len();
-        if n > self.fewer_from && self.bounds.is_empty() {
-            let with_choice = island.blocks.iter().zip(choices).filter(|(_, choice)| choice.is_coupled());
-            let blocks = with_choice.map(|(block, choice)| (block, at.point(block), *choice));
-            let solved = self.sliding.change(blocks, k, epsilon, lambda);
-            if solved {
-                self.multiply(change);
-            }
-            return solved;
-        }
-        matrix.clear();
-        matrix.resize(n * n, 0.0);
-        right.clear();
-        pulled.clear();
-        pulled.resize(count, 0.0);
-        if lambda.iter().any(|x| *x != 0.0) {
-            multiply(k, lambda, pulled);
-        }
-        if !self.bounds.is_empty() {
-            places.clear();
-            places.resize(count, None);
-            coupled.iter().enumerate().for_each(|(place, &row)| places[row] = Some(place));
-        }
-        let mut first = 0;
-        for (block, choice) in island.blocks.iter().zip(choices).filter(|(block, choice)| is_coupled(block, choice)) {
-            let point = at.point(block);
-            let f = point.function(block, *choice);
-            if let Some(bound) = block.bound.filter(|_| !choice.is_coupled()) {
-                let row = &mut matrix[first * n..][..n];
-                let d = block.diagonal.max(f64::MIN_POSITIVE);
-                row[first] = (1.0 + epsilon) * d;
-                let (mut known, sign) = (-f[0], if *choice == Choice::Low { 1.0 } else { -1.0 });
-                let follows = at.bounds[bound as usize] > 0.0;
-                for &(of, a) in self.bounds[bound as usize].iter().filter(|_| follows) {
-                    match places[of] {
-                        Some(place) => row[place] += sign * d * a,
-                        None => known -= sign * d * a * lambda[of],
-                    }
-                }
-                right.push(known);
-                first += 1;
-                continue;
-            }
-            let Derivative { by_lambda, by_w } = Derivative::new(block, &point, *choice);
-            let pulls = [0, 1, 2].map(|i| if i < block.rows { pulled[block.row + i] } else { 0.0 });
-            for i in 0..block.rows {
-                let row = &mut matrix[(first + i) * n..][..n];
-                for (j, weight) in by_w[i].iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-                    if j < block.rows {
-                        let from = &k[(block.row + j) * count..][..count];
-                        let mut rest = &mut row[..];
-                        for &[first, len] in &*stretches {
-                            let (own, after) = rest.split_at_mut(len);
-                            own.iter_mut().zip(&from[first..]).for_each(|(x, from)| *x += weight * from);
-                            rest = after;
-                        }
-                    }
-                }
-                (0..block.rows).for_each(|j| row[first + j] += by_lambda[i][j]);
-                row[first + i] += (epsilon * block.diagonal).max(f64::MIN_POSITIVE);
-                right.push(-f[i] - (0..block.rows).map(|j| by_w[i][j] * pulls[j]).sum::<f64>());
-            }
-            first += block.rows;
-        }
-        if !dense::solve(matrix, right) {
-            return false;
-        }
-        coupled.iter().zip(&*right).for_each(|(&at, x)| lambda[at] = *x);
-        self.multiply(change);
-        true
     }
 }
 
