@@ -2,6 +2,7 @@
 
 use super::events::{Event, Touches, Touching};
 use super::state::WorldState;
+use super::step_error::StepError;
 use crate::contact::detect::{ContactConstraint, DetectorBuffers, Owner, PartTable};
 use crate::contact::pair_material::PairMaterials;
 use crate::contact::warm_starts::{RowStart, WarmStart};
@@ -10,127 +11,14 @@ use crate::each_object::first_object;
 use crate::integrators::context::IntegrationContext;
 use crate::linearize::Branches;
 use crate::object::part_state::{Forces, PartState, Wrench};
-use crate::object::{Object, has_sensor};
 use crate::report::StepReport;
-use crate::rigid::RigidBody;
 use crate::sensor::loads::FrameLoads;
 use crate::settings::Settings;
 use crate::solver::RowSolver;
 use crate::step::{Attempt, LargestTurn, Moment, ResistingBodies, WorkMeter};
 use crate::threads::Threads;
-use crate::world::view::{Entry, Mode, ObjectId, Objects, Table, WorldView};
+use crate::world::view::{Entry, ObjectId, Objects, Table, WorldView};
 use tumble_collide::{BroadPhase, SweepAndPrune, Vec3};
-
-/// An error that stopped a step. [`World::step`](crate::World::step) restores state and time to
-/// those before the frame.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StepError {
-    /// A force, a momentum or a position is not finite.
-    #[error("'{object}' at t = {time} s: {what} is not finite; look at the forces and impulses given to it")]
-    NotFinite {
-        /// Object.
-        object: String,
-        /// The quantity: a force or the state.
-        what: &'static str,
-        /// Simulated time, s.
-        time: f64,
-    },
-    /// A part flies away, which is an instability: of an explicit force, or of the step.
-    #[error(
-        "'{object}' at t = {time} s: part {part} flies away: {what}, is {value:e}, at most {most:e} is admissible; shorten dt, or look at the forces given to it: one that a program computes from the velocity is stable for |dF/dv| below 2·mass/dt"
-    )]
-    Runaway {
-        /// Object.
-        object: String,
-        /// Part of the object: a link of an articulated body, 0 of a rigid body.
-        part: usize,
-        /// The quantity, with its unit: the speed of the part's surface or its distance from the origin.
-        what: &'static str,
-        /// Its value, m/s or m.
-        value: f64,
-        /// Largest admissible value, m/s or m.
-        most: f64,
-        /// Simulated time, s.
-        time: f64,
-    },
-    /// An object's mass matrix is singular.
-    #[error("'{object}' at t = {time} s: {why}")]
-    Singular {
-        /// Object.
-        object: String,
-        /// The singular joint, and a remedy.
-        why: String,
-        /// Simulated time, s.
-        time: f64,
-    },
-    /// The adaptive integrator cannot hold its tolerance.
-    #[error(
-        "'{object}' at t = {time} s: its motion needs more than the {steps} inner steps of this frame (the last of {step} s) at the integrator's tolerance {tolerance}; soften what acts on it, or loosen the tolerance"
-    )]
-    Tolerance {
-        /// The object with the largest error.
-        object: String,
-        /// Simulated time, s.
-        time: f64,
-        /// Length of the last inner step tried, s.
-        step: f64,
-        /// Inner steps of this frame, rejected ones included.
-        steps: u32,
-        /// `Settings::integrator_tolerance`.
-        tolerance: f64,
-    },
-    /// The stepper did not advance the world by the length of a frame.
-    #[error("stepper '{stepper}' advanced the world by {advanced} s; a frame has {dt} s")]
-    Duration {
-        /// Name of the stepper.
-        stepper: &'static str,
-        /// Time that it advanced, s.
-        advanced: f64,
-        /// `Settings::dt`.
-        dt: f64,
-    },
-    /// The forces of joints turn a part too far even in the shortest sub-steps.
-    #[error(
-        "'{object}' at t = {time} s: the forces of its joints turn part {part} by {turn} rad in a sub-step, though it is divided as far as admissible; at most {most} is: shorten dt, give its lightest parts more inertia, or raise max_turn"
-    )]
-    Turn {
-        /// Object.
-        object: String,
-        /// Part of the object: a link of an articulated body, 0 of a rigid body.
-        part: usize,
-        /// Turn, rad.
-        turn: f64,
-        /// `Settings::max_turn`.
-        most: f64,
-        /// Simulated time, s.
-        time: f64,
-    },
-    /// An action of a scripted event failed.
-    #[error("event '{event}': {why}")]
-    Event {
-        /// Name of the event.
-        event: String,
-        /// The fault.
-        why: super::WorldError,
-    },
-    /// A callback of a scripted event returned an error.
-    #[error("the callback of event '{event}': {why}")]
-    Callback {
-        /// Name of the event.
-        event: String,
-        /// Its text.
-        why: String,
-    },
-    /// A constraint made an invalid row.
-    #[error("constraint '{object}': {why}")]
-    Row {
-        /// Object.
-        object: String,
-        /// The fault of the row.
-        why: String,
-    },
-}
 
 /// One contact after a step, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -381,83 +269,6 @@ impl Core {
         self.held_wrenches.clear();
     }
 
-    /// Before a frame: computes part states and caches of all objects that are not settled.
-    pub(super) fn refresh_walked(&mut self) {
-        if self.stale {
-            return self.refresh();
-        }
-        self.wake_for_forces();
-        self.table.gather();
-        self.integration().refresh();
-    }
-
-    /// Forces may act on sleeping objects, which must then be walked.
-    fn wake_for_forces(&mut self) {
-        if self.table.walk.asleep > 0 && self.has_forces() {
-            self.table.walk.unsettle_all();
-        }
-    }
-
-    /// Returns whether any object acts on others by forces.
-    pub(super) fn has_forces(&self) -> bool {
-        self.objects().iter().any(|e| e.status.enabled && e.object.force().is_some())
-    }
-
-    /// Starts a frame, or starts it again: numbers the degrees of freedom of what it walks.
-    pub(super) fn enter_frame(&mut self) {
-        self.dof = self.table.number_walked();
-        let applied = &self.state.applied_generalized;
-        self.applied_now.clear();
-        match self.table.walk.kept() {
-            None => self.applied_now.extend_from_slice(applied),
-            Some(starts) => {
-                for (place, start) in self.table.walk.places.iter().zip(starts) {
-                    let count = self.table.placed[*place as usize].state_range.v.len();
-                    self.applied_now.extend_from_slice(&applied[*start..*start + count]);
-                }
-            }
-        }
-    }
-
-    /// Ends a frame.
-    pub(super) fn leave_frame(&mut self) {
-        self.dof = self.table.number_all();
-        self.applied_now.clear();
-    }
-
-    /// Returns the generalized forces that users apply, as the degrees of freedom are numbered now.
-    pub(crate) fn applied_generalized(&self) -> &[f64] {
-        if self.table.walk.dof.is_some() { &self.applied_now } else { &self.state.applied_generalized }
-    }
-
-    /// Goes back to the state at the start of the frame. What the frame did not walk is as it was.
-    pub(super) fn restart_frame(&mut self, before: &WorldState) {
-        self.table.gather();
-        self.state.copy_walked(before, &self.table);
-        self.state.groups.clone_from(&before.groups);
-        self.group_changes += 1;
-        self.clear_contact_forces();
-        for range in self.table.walk.parts.iter() {
-            self.state.write_accelerations(range, &mut self.derived.part_states);
-        }
-        self.integration().refresh();
-    }
-
-    /// Ends a frame: objects that rest need not be walked in the next ones.
-    pub(super) fn settle(&mut self) {
-        if self.branches.are_recorded() {
-            return;
-        }
-        let forces = !self.state.groups.is_empty() && self.has_forces();
-        let Core { table, state, .. } = self;
-        let (placed, objects) = (&table.placed, &state.objects);
-        table.walk.settle(|place| {
-            let object = &objects[place];
-            let rests = object.status.mode == Mode::Static || !object.status.enabled || (object.asleep && !forces);
-            (rests && may_settle(placed[place].object.as_ref())).then_some(object.asleep)
-        });
-    }
-
     /// Computes part states and caches from the state.
     pub(crate) fn refresh(&mut self) {
         self.table.walk.unsettle_all();
@@ -597,16 +408,4 @@ impl Core {
     fn not_finite(&self, object: &str, what: &'static str) -> StepError {
         StepError::NotFinite { object: object.to_string(), what, time: self.state.time }
     }
-}
-
-/// Returns whether a step may leave the object out while it rests: a rigid body that is no sensor and acts on
-/// nothing.
-fn may_settle(object: &dyn Object) -> bool {
-    let any: &dyn std::any::Any = object;
-    let sensor = || object.collidable().is_some_and(has_sensor);
-    any.is::<RigidBody>()
-        && object.constraint().is_none()
-        && object.force().is_none()
-        && object.frame_state().is_none()
-        && !sensor()
 }

@@ -8,7 +8,8 @@
 //! The equations are Newton's, so a surface faster than light is the result of an instability: of an explicit force that
 //! overshoots, or of a fault of the engine.
 
-use super::core::{Core, StepError};
+use super::core::Core;
+use super::step_error::StepError;
 use super::view::Entry;
 use crate::each_object::first_object;
 use crate::object::part_state::PartState;
