@@ -164,6 +164,23 @@ def test_a_world_is_saved_after_a_body_with_joints_and_sensors_was_removed(tmp_p
     assert read.save() == world.save()
 
 
+def test_flocks_and_fields_of_removed_bodies_are_saved(tmp_path):
+    world = tumble.World()
+    for x, name in enumerate("ab"):
+        world.add_rigid(name, tumble.Sphere(0.1), mass=1, position=(x, 0, 1))
+    flock = world.add_body_flock("flock")
+    flock.add("a"), flock.add("b")
+    world.add_field("wind", tumble.Field.wind((1, 0, 0)), targets=["a", "b"])
+    for name, left in (("a", ["b"]), ("b", [])):
+        world.remove(name)
+        assert world.save_scene(tmp_path / "now.toml") == []
+        read = tumble.World.load(tmp_path / "now.toml")
+        assert read.save() == world.save() and [body.name for body in read.bodies] == left
+        for other in (world, read):
+            other.step(10)
+        assert read.save() == world.save()
+
+
 def test_a_coupling_names_joints():
     world, _, _ = pair()
     with pytest.raises(UnknownNameError, match="joint: the world has no joint named 'nope'; it has none that add_joint made; a joint of an artic"):
@@ -191,8 +208,8 @@ def test_no_error_has_an_empty_name():
         lambda: setattr(world.add_joint("revolute", ball), "limits", (1, -1)),
         lambda: world.add_rigid(tumble.Sphere(0.1), mass=-1),
         lambda: world.add_rigid(tumble.Sphere(0.1), mass=1, density=1),
-        lambda: world.add_boid(max_speed=-1),
-        lambda: world.add_particles(lifetime=-1),
+        lambda: world.add_static(tumble.Sphere(0.1), friction=-1),
+        lambda: world.add_event("", tumble.Trigger.time(-1), []),
     ]
     for call in calls:
         with pytest.raises((InvalidValueError, TypeError)) as caught:

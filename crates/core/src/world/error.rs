@@ -24,7 +24,7 @@ pub enum WorldError {
         why: BodyError,
     },
     /// A scripted event, or its template, cannot be added.
-    #[error("event '{name}': {why}")]
+    #[error("{}: {why}", titled("event", name))]
     Event {
         /// Name of the event or template.
         name: String,
