@@ -99,9 +99,6 @@ impl LoopJoint {
         let JointPlace { point, second_point, axis, second_axis, ground } = place;
         let second_point = second_point.unwrap_or(point);
         let own_axes = matches!(kind, LoopJointKind::Gear | LoopJointKind::Rack);
-        if second_point != point && !(kind.has_length() || own_axes) {
-            return Err(LoopJointError::Parameter { name, kind, parameter: "second_point" });
-        }
         let next = || Vec3::ith((axis.iamax() + 1) % 3, 1.0);
         let second_axis = match kind {
             LoopJointKind::Planar | LoopJointKind::Spherical => Some(second_axis.unwrap_or_else(next)),
@@ -111,6 +108,9 @@ impl LoopJoint {
         let directions = [Some(axis), second_axis].into_iter().flatten();
         if [point, second_point].into_iter().chain(ground).chain(directions).any(|v| v.iter().any(|x| !x.is_finite())) {
             return Err(LoopJointError::NotFinite(name));
+        }
+        if second_point != point && !(kind.has_length() || own_axes) {
+            return Err(LoopJointError::Parameter { name, kind, parameter: "second_point" });
         }
         let rotations = [rotation(&name, axis, second_x)?, rotation(&name, second_z, second_x)?];
         let points = [point, if kind.has_length() || own_axes { second_point } else { point }];
