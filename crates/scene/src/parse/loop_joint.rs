@@ -362,8 +362,8 @@ const OF_SOME_KINDS: [(&str, &str); 30] = [
 
 /// Reports keys that joints of a kind do not have.
 fn refuse_foreign(f: &mut Fields<'_>, kind: LoopJointKind) {
-    for (key, parameter) in OF_SOME_KINDS {
-        let Some(value) = f.unread(key).filter(|_| !kind.has(parameter)) else { continue };
+    for (key, parameter) in OF_SOME_KINDS.into_iter().filter(|(_, parameter)| !kind.has(parameter)) {
+        let Some(value) = f.unread(key) else { continue };
         let types = LoopJointKind::names_with(parameter).join(", ");
         f.wrong(key, value, format!("no `{key}` of type \"{}\"; types with it: {types}", kind.name()));
     }
