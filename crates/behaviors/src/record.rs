@@ -72,8 +72,9 @@ impl Record {
     }
 }
 
+/// Returns objects by their indices, without those that were removed: these have no effect.
 fn list(ids: &[ObjectId], indices: &ObjectIndices) -> Vec<Index> {
-    ids.iter().map(|id| indices.of_id(*id)).collect()
+    ids.iter().filter_map(|id| indices.of_id(*id)).map(Some).collect()
 }
 
 fn targets(of: &Targets, indices: &ObjectIndices) -> Option<Vec<Index>> {

@@ -44,6 +44,7 @@ pub mod solver;
 pub mod spatial;
 mod step;
 mod threads;
+mod titled;
 mod world;
 
 pub use archive::ArchiveError;

@@ -114,26 +114,26 @@ def test_arrays_of_all_bodies():
     assert world.positions.shape == (5, 3) and world.orientations.shape == (5, 4)
     assert world.positions[2:] == pytest.approx(np.array([ball.position for ball in balls]))
     assert arm.name == "arm" and np.isfinite(world.positions[1]).all()
-    positions = world.positions
+    positions = world.positions.copy()
     positions[2:] += (0, 1, 0)
     world.positions = positions
     assert balls[2].position == pytest.approx([2, 1, 1])
-    velocities = world.velocities
+    velocities = world.velocities.copy()
     velocities[3] = (1, 2, 3)
     world.velocities = velocities
     assert balls[1].velocity == pytest.approx([1, 2, 3]) and balls[0].velocity == pytest.approx([0, 0, 0])
-    spins = world.angular_velocities
+    spins = world.angular_velocities.copy()
     spins[4] = (0, 0, 7)
     world.angular_velocities = spins
     assert balls[2].angular_velocity == pytest.approx([0, 0, 7])
-    turned = world.orientations
+    turned = world.orientations.copy()
     turned[2] = (0, 0, 1, 0)
     world.orientations = turned
     assert balls[0].orientation == pytest.approx([0, 0, 1, 0])
     before = world.save()
     with pytest.raises(tumble.InvalidValueError, match=r"positions: expected shape \(5, 3\), got \(4, 3\)"):
         world.positions = np.zeros((4, 3))
-    moved = world.positions
+    moved = world.positions.copy()
     moved += 1
     with pytest.raises(tumble.InvalidValueError, match="'arm' is an articulation"):
         world.positions = moved

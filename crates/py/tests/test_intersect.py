@@ -140,7 +140,7 @@ class Wrong(tumble.Intersect):
         ([(1, 2)], "3 to 6 entries"),
         ([((0, 0, 0), (0, 0, 0), 0.1)], "without length"),
         ([((0, 0, 0), (0, 0, 1), float("nan"))], "not finite"),
-        ([3], "tuples"),
+        ([3], "contact 0 is 3; expected a tuple"),
     ],
 )
 def test_wrong_contacts_are_errors_and_nothing_moves(answer, message):

@@ -195,7 +195,7 @@ def test_kinds_of_joints_leave_their_motion_free():
         for k, motion in enumerate("xyzABC"):
             world = tumble.World(gravity=(0, 0, 0))
             body = world.add_rigid("body", tumble.Box(0.2), mass=1, inertia=(1, 1, 1))
-            joint = world.add_joint(kind, body, second_axis=(1, 0, 0))
+            joint = world.add_joint(kind, body, second_axis=(1, 0, 0) if kind in ("universal", "planar") else None)
             for _ in range(24):
                 push = np.eye(3)[k % 3]
                 body.apply_force(push) if k < 3 else body.apply_torque(push)

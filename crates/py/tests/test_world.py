@@ -166,8 +166,8 @@ def test_a_compound_has_the_densities_of_its_parts():
     ("parts", "message"),
     [
         ([], "a compound of 0 parts; it must have 1 to 4096"),
-        ([tumble.Sphere(1)], r"part 0 of a compound: expected \(shape, position\)"),
-        ([(tumble.Sphere(1), (0, 0, 0)), (1, (0, 0, 0))], "part 1 of a compound: expected"),
+        ([tumble.Sphere(1)], r"part 1 of a compound: expected \(shape, position\)"),
+        ([(tumble.Sphere(1), (0, 0, 0)), (1, (0, 0, 0))], "part 2 of a compound: expected"),
         ([(tumble.Sphere(1), (0, 0, 0), None, -1)], "density is -1, but must be finite and above 0"),
         ([(tumble.HalfSpace(), (0, 0, 0))], "part 1 of a compound is a half-space"),
         ([(tumble.Sphere(1), (0, 0, 0)), (tumble.Sphere(1), (0, 0, 0), None, 5)], "part 2 of a compound has a density, unlike part 1"),

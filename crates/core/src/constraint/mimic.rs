@@ -29,6 +29,7 @@ use crate::constraint::loop_joint::{JointCoordinate, LoopJoint, LoopJointKind};
 use crate::constraint::rows::RowSet;
 use crate::object::part_state::{StateRange, Wrench};
 use crate::object::{Constraint, Level, Object, RowTarget};
+use crate::titled::titled;
 use crate::world::World;
 use crate::world::view::{ObjectId, WorldView};
 use std::f64::consts::TAU;
@@ -60,7 +61,9 @@ impl JointRef {
 pub enum MimicError {
     /// A joint is no joint with one position.
     #[error(
-        "mimic '{name}': '{joint}' is no joint that can be coupled: expected a loop joint with a position, other than a spherical one, or a revolute or prismatic joint of an articulated body"
+        "{}: {} is no joint that can be coupled: expected a loop joint with a position, other than a spherical one, or a revolute or prismatic joint of an articulated body",
+        titled("mimic", name),
+        if joint.is_empty() { "an object that was removed".into() } else { format!("'{joint}'") }
     )]
     Joint {
         /// Name of the coupling.
@@ -69,11 +72,12 @@ pub enum MimicError {
         joint: String,
     },
     /// Both joints are the same.
-    #[error("mimic '{0}' couples a joint to itself; expected two joints")]
+    #[error("{} couples a joint to itself; expected two joints", titled("mimic", .0))]
     Same(String),
     /// The joints move more than two objects.
     #[error(
-        "mimic '{name}': its joints join {count} dynamic objects; a row acts on at most two, such as two bodies on the world, or links of two robots"
+        "{}: its joints join {count} dynamic objects; a row acts on at most two, such as two bodies on the world, or links of two robots",
+        titled("mimic", name)
     )]
     Objects {
         /// Name of the coupling.
@@ -82,7 +86,7 @@ pub enum MimicError {
         count: usize,
     },
     /// A number is out of its range.
-    #[error("mimic '{name}': the {what} is {value}; it must be {expected}")]
+    #[error("{}: the {what} is {value}; it must be {expected}", titled("mimic", name))]
     Range {
         /// Name of the coupling.
         name: String,
@@ -161,6 +165,11 @@ impl Mimic {
             Some(_) => Ok(mimic),
             None => Err(mimic.without_step()),
         }
+    }
+
+    /// Sets its name.
+    pub(crate) fn set_name(&mut self, name: &str) {
+        self.name = name.into();
     }
 
     fn without_step(&self) -> MimicError {
@@ -335,6 +344,10 @@ impl Object for Mimic {
 
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
+    }
+
+    fn attached_to(&self, other: ObjectId) -> bool {
+        self.joints.iter().any(|joint| joint.object() == other)
     }
 }
 

@@ -188,7 +188,8 @@ pub trait Integratable: Object {
     }
     /// Returns the length of the steps that the object's rate and mass matrix are made for, s, as those of springs that are
     /// implicit in time. `backtracking` takes steps of `time_stepping` of this length while such an object moves: no event can be
-    /// located within one. `None` by default: any length will do.
+    /// located within one. At least a ten-thousandth of `Settings::dt`, and finite; the step ends with
+    /// [`StepError::MadeForStep`](crate::StepError::MadeForStep) otherwise. `None` by default: any length will do.
     fn made_for_step(&self) -> Option<f64> {
         None
     }

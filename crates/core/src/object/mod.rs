@@ -43,6 +43,7 @@ pub use visual::Renderable;
 
 use crate::archive::{ObjectIndices, ObjectRecord};
 use crate::derived::Cache;
+use crate::world::view::ObjectId;
 use part_state::PartState;
 use std::any::Any;
 
@@ -98,6 +99,12 @@ pub trait Object: Fork + Any + Send + Sync {
     /// Returns the interface of an object that carries lights.
     fn light(&self) -> Option<&dyn LightCarrier> {
         None
+    }
+    /// Returns whether it has no meaning without another object, as a joint without a body that it joins or a sensor
+    /// without the body that carries it. [`World::remove`](crate::World::remove) removes it with that object. False by default.
+    fn attached_to(&self, other: ObjectId) -> bool {
+        let _ = other;
+        false
     }
     /// Returns its constants for an archive, with other objects by index; `None`, the default, for an object that the caller
     /// of [`World::archive`](crate::World::archive) writes itself.

@@ -34,6 +34,7 @@ use crate::object::frame_state::{Frame, FrameImpulse};
 use crate::object::net_sync::{read_state, write_state};
 use crate::object::part_state::StateRange;
 use crate::object::{FrameState, NetSync, Object, SyncError};
+use crate::titled::titled;
 use crate::world::view::{ObjectId, WorldView};
 use tumble_collide::Shape;
 
@@ -47,7 +48,7 @@ pub const MAX_DELAYED_PIXELS: u64 = 1 << 22;
 #[non_exhaustive]
 pub enum SensorError {
     /// A constant is out of its range.
-    #[error("sensor '{name}': {what} is {value}; it must be {expected}")]
+    #[error("{}: {what} is {value}; it must be {expected}", titled("sensor", name))]
     Range {
         /// Sensor.
         name: String,
@@ -59,7 +60,7 @@ pub enum SensorError {
         expected: &'static str,
     },
     /// The kind of sensor does not have the setting, or cannot be at that place.
-    #[error("sensor '{name}' of kind '{kind}': {why}")]
+    #[error("{} of kind '{kind}': {why}", titled("sensor", name))]
     Kind {
         /// Sensor.
         name: String,
@@ -278,6 +279,11 @@ impl Sensor {
         self.with_kept_images()
     }
 
+    /// Sets its name.
+    pub(crate) fn set_name(&mut self, name: &str) {
+        self.name = name.into();
+    }
+
     fn wrong(&self, why: &'static str) -> SensorError {
         SensorError::Kind { name: self.name.clone(), kind: self.kind.name(), why }
     }
@@ -325,6 +331,10 @@ impl Object for Sensor {
 
     fn frame_state(&self) -> Option<&dyn FrameState> {
         Some(self)
+    }
+
+    fn attached_to(&self, other: ObjectId) -> bool {
+        self.place.object() == Some(other) || self.reference.is_some_and(|reference| reference.is_on(other))
     }
 
     /// All its numbers are sent: a facet reads what the server reads, to the bit.

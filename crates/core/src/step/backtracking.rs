@@ -94,6 +94,8 @@ const STIFF: f64 = 0.5;
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
 /// Shortest sub-step to which the error of contacts that move leads, as a fraction of the frame.
 const SHORTEST: f64 = 1.0 / 64.0;
+/// Maximum number of steps in a frame that an object is made for.
+const MOST_MADE_STEPS: f64 = 10_000.0;
 /// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 200;
 /// Maximum number of corrections of a time found by dense output, before the dense state is taken.
@@ -111,9 +113,18 @@ fn next_length(core: &Core, (h, went): (f64, f64), error: f64) -> f64 {
 }
 
 /// Returns the shortest length of a step that a moving object is made for, s.
-fn steps_made_for(core: &Core) -> Option<f64> {
-    let moving = core.objects().iter().filter(|entry| entry.moves());
-    moving.filter_map(|entry| entry.object.integratable()?.made_for_step()).min_by(f64::total_cmp)
+fn steps_made_for(core: &Core) -> Result<Option<f64>, StepError> {
+    let least = core.settings.dt / MOST_MADE_STEPS;
+    let mut shortest = None;
+    for entry in core.objects().iter().filter(|entry| entry.moves()) {
+        let Some(step) = entry.object.integratable().and_then(|body| body.made_for_step()) else { continue };
+        if !(step.is_finite() && step >= least) {
+            let object = core.table.placed[entry.place].name.to_string();
+            return Err(StepError::MadeForStep { object, step, least });
+        }
+        shortest = Some(shortest.map_or(step, |other: f64| other.min(step)));
+    }
+    Ok(shortest)
 }
 
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
@@ -165,7 +176,7 @@ impl Backtracking {
     fn piece(&mut self, core: &mut Core, end: f64) -> Result<(), StepError> {
         let (dt, most) = (core.settings.dt, TRIES * core.division);
         let mut left = if core.division == 1 { dt } else { end - core.state.time };
-        if let Some(step) = steps_made_for(core) {
+        if let Some(step) = steps_made_for(core)? {
             let count = (left / step).round().max(1.0);
             (0..count as u32).try_for_each(|_| self.fallback.substep(core, left / count))?;
             core.state.time = end;

@@ -198,24 +198,31 @@ impl World {
     }
 
     /// Sets velocity (m/s, of the center of mass) and angular velocity (rad/s, world axes) of a
-    /// rigid body. A kinematic body follows them.
+    /// rigid body. A kinematic body follows them. A static body takes zeros alone.
     ///
     /// # Errors
-    /// [`WorldError`]: the object was removed, is not a rigid body, or a number is not finite.
+    /// [`WorldError`]: the object was removed, is not a rigid body or is static, or a number is not finite.
     pub fn set_velocity(&mut self, id: ObjectId, velocity: Vec3, angular_velocity: Vec3) -> Result<(), WorldError> {
         let (w, v) = (angular_velocity, velocity);
+        if (v, w) != (Vec3::zeros(), Vec3::zeros()) && self.status(id).is_some_and(|s| s.mode == Mode::Static) {
+            return Err(WorldError::Static(self.name(id).unwrap_or_default().into()));
+        }
         self.edit_rigid(id, |body, x| body.write_velocity(x, &[w.x, w.y, w.z, v.x, v.y, v.z]))
     }
 
     /// Sets the velocity of a kinematic body so that its frame is at `target` at the end of the
-    /// next step.
+    /// next step. A body of another mode is placed by [`set_pose`](Self::set_pose).
     ///
     /// # Errors
-    /// [`WorldError`]: the object was removed, is not a rigid body, or the target is not finite.
+    /// [`WorldError`]: the object was removed, is not a rigid body or is not kinematic, or the target is not finite.
     pub fn move_to(&mut self, id: ObjectId, target: Pose) -> Result<(), WorldError> {
         let dt = self.core.settings.dt;
+        let name = self.name(id).ok_or(WorldError::Stale)?;
+        let (name, rigid) = (name.to_string(), self.get::<RigidBody>(id).is_some());
+        if let Some(Status { mode, .. }) = self.status(id).filter(|s| rigid && s.mode != Mode::Kinematic) {
+            return Err(WorldError::NotKinematic { name, mode });
+        }
         if !target.to_homogeneous().iter().all(|x| x.is_finite()) {
-            let name = self.name(id).ok_or(WorldError::Stale)?.to_string();
             return Err(WorldError::NotFinite(name));
         }
         self.edit_rigid(id, |body, x| {

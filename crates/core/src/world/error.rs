@@ -5,6 +5,8 @@ use crate::articulated::ArticulatedError;
 use crate::constraint::mimic::MimicError;
 use crate::rigid::BodyError;
 use crate::settings::SettingsError;
+use crate::titled::titled;
+use crate::world::view::Mode;
 
 /// Reason why a call to a world failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -22,7 +24,7 @@ pub enum WorldError {
         why: BodyError,
     },
     /// A scripted event, or its template, cannot be added.
-    #[error("event '{name}': {why}")]
+    #[error("{}: {why}", titled("event", name))]
     Event {
         /// Name of the event or template.
         name: String,
@@ -50,8 +52,21 @@ pub enum WorldError {
     /// The call needs a loop joint.
     #[error("'{0}' is not a loop joint")]
     NotJoint(String),
+    /// The call needs a kinematic body.
+    #[error(
+        "body '{name}' is {mode}, and move_to is for kinematic bodies: set its position and orientation to place it, or make it kinematic"
+    )]
+    NotKinematic {
+        /// Name of the body.
+        name: String,
+        /// Its mode.
+        mode: Mode,
+    },
+    /// A static body has no velocity.
+    #[error("body '{0}' is static and has no velocity; a kinematic body moves at the velocity that it is given")]
+    Static(String),
     /// A sensor cannot read what it names, or the object is no sensor.
-    #[error("sensor '{name}': {why}")]
+    #[error("{}: {why}", titled("sensor", name))]
     Sensor {
         /// Name of the sensor.
         name: String,

@@ -45,6 +45,8 @@ pub use state::WorldState;
 pub use state_memory::{StateMemory, StateMemoryHold};
 pub use working_memory::WorkingMemory;
 
+use crate::constraint::loop_joint::LoopJoint;
+use crate::constraint::mimic::Mimic;
 use crate::contact::detect::Owner;
 use crate::object::part_state::{PartState, StateRange, StateSizes};
 use crate::object::visual::Visual;
@@ -391,6 +393,7 @@ impl World {
             "" => self.new_name(object.as_ref()),
             name => name.to_string(),
         };
+        own_name(object.as_mut(), &name);
         let any: &dyn std::any::Any = object.as_ref();
         let Some(sensor) = any.downcast_ref::<Sensor>() else { return self.add_named(name, object, mode) };
         self.check_sensor(sensor)?;
@@ -470,12 +473,28 @@ impl World {
         Ok(id)
     }
 
-    /// Removes an object and returns it. Its range of the state is removed, and the ranges
-    /// behind it move up.
+    /// Removes an object and returns it. What has no meaning without it is removed too ([`Object::attached_to`]): the loop
+    /// joints and mimics of a body, the sensors on a body or joint, and those that read against it. The ranges of the state
+    /// of all of them are removed, and the ranges behind them move up.
     ///
     /// # Errors
     /// [`WorldError::Stale`] if the object was removed before.
     pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
+        let mut attached = vec![id];
+        let mut known = 0;
+        while let Some(&on) = attached.get(known) {
+            let goes = |id: &ObjectId| self.object(*id).is_some_and(|object| object.attached_to(on));
+            let more: Vec<ObjectId> =
+                self.ids().iter().filter(|id| goes(id) && !attached.contains(id)).copied().collect();
+            attached.extend(more);
+            known += 1;
+        }
+        attached.drain(1..).rev().try_for_each(|other| self.remove_alone(other).map(drop))?;
+        self.remove_alone(id)
+    }
+
+    /// Removes an object and nothing that is attached to it.
+    pub(crate) fn remove_alone(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
         self.core.wake(id);
         self.forget_drives(id);
         let core = &mut self.core;
@@ -509,6 +528,18 @@ impl World {
     pub fn fork(&self) -> World {
         let first_drives = self.first_drives.clone();
         World { first_drives, ..World::of(self.core.fork(), self.stepper.fork(), self.names.clone()) }
+    }
+}
+
+/// Gives a joint, a mimic or a sensor the name that it has in the world, for its errors.
+fn own_name(object: &mut dyn Object, name: &str) {
+    let any: &mut dyn std::any::Any = object;
+    if let Some(joint) = any.downcast_mut::<LoopJoint>() {
+        joint.set_name(name);
+    } else if let Some(mimic) = any.downcast_mut::<Mimic>() {
+        mimic.set_name(name);
+    } else if let Some(sensor) = any.downcast_mut::<Sensor>() {
+        sensor.set_name(name);
     }
 }
 

@@ -119,6 +119,14 @@ impl Replica<'_> {
         core.state.touching = touching;
     }
 
+    /// Removes an object, and nothing that is attached to it: the other process says what it has.
+    ///
+    /// # Errors
+    /// [`WorldError::Stale`] if the object was removed before.
+    pub fn remove(&mut self, id: ObjectId) -> Result<Box<dyn Object>, WorldError> {
+        self.0.remove_alone(id)
+    }
+
     /// Adds a sensor whose readings come from elsewhere, so it reads nothing at its addition and need not fit this world.
     ///
     /// # Errors

@@ -59,6 +59,18 @@ pub enum StepError {
         /// `Settings::integrator_tolerance`.
         tolerance: f64,
     },
+    /// An object is made for steps of a length that no stepper can take.
+    #[error(
+        "'{object}' is made for steps of {step} s (Integratable::made_for_step); expected at least {least} s, a ten-thousandth of the frame, and finite"
+    )]
+    MadeForStep {
+        /// Object.
+        object: String,
+        /// Length that it returned, s.
+        step: f64,
+        /// Least length, s.
+        least: f64,
+    },
     /// The stepper did not advance the world by the length of a frame.
     #[error("stepper '{stepper}' advanced the world by {advanced} s; a frame has {dt} s")]
     Duration {

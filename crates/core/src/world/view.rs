@@ -30,6 +30,16 @@ pub enum Mode {
     Dynamic,
 }
 
+impl std::fmt::Display for Mode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Mode::Static => "static",
+            Mode::Kinematic => "kinematic",
+            Mode::Dynamic => "dynamic",
+        })
+    }
+}
+
 /// Settings of an object that change between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Status {

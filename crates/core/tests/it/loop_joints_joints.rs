@@ -220,6 +220,7 @@ fn a_loop_joint_without_one_of_its_sides_holds_nothing() {
         assert!(world.get::<LoopJoint>(joint).unwrap().position_error(&world.view()).is_none());
         assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is disabled");
         world.remove(post).unwrap();
+        assert!(world.object(joint).is_none(), "a joint goes with its body");
         world.set_velocity(ball, Vec3::zeros(), Vec3::zeros()).unwrap();
         assert!((falls(&mut world) - 0.5 * G * 0.01).abs() < 1e-9, "{stepper}: it falls when the post is gone");
     }

@@ -451,7 +451,10 @@ fn wrong_settings_are_named() {
     let mut world = world("time_stepping", DT);
     let id = ball(&mut world, at(0.0, 0.0, 0.0));
     let other = ball(&mut world, at(3.0, 0.0, 0.0));
-    let joint = |kind| join(&world, kind, id, None, JointPlace::between(Vec3::zeros(), Vec3::x()));
+    let joint = |kind: LoopJointKind| {
+        let place = JointPlace::between(Vec3::zeros(), Vec3::x());
+        join(&world, kind, id, None, if kind.has_length() { place } else { JointPlace::at(Vec3::zeros()) })
+    };
     let of = |result: Result<LoopJoint, LoopJointError>| result.unwrap_err().to_string();
     let spring = |rest| DofSettings { spring: Some(Spring { stiffness: 10.0, rest }), ..DofSettings::default() };
     // a rope of 5 m on each side
@@ -495,6 +498,40 @@ fn wrong_settings_are_named() {
     let place = JointPlace::on_line(Vec3::zeros(), Vec3::z()).with_second_axis(Vec3::z() * 2.0);
     let parallel = LoopJoint::joining("joint", LoopJointKind::Universal, &world, Some((id, 0)), None, place);
     assert_eq!(parallel.unwrap_err(), LoopJointError::Parallel("joint".into()));
+    for (place, parameter) in [
+        (JointPlace::between(Vec3::zeros(), Vec3::x()), "second_point"),
+        (JointPlace { ground: [Vec3::z(); 2], ..JointPlace::at(Vec3::zeros()) }, "ground"),
+    ] {
+        let wrong = LoopJoint::joining("joint", LoopJointKind::Revolute, &world, Some((id, 0)), None, place);
+        let kind = LoopJointKind::Revolute;
+        assert_eq!(wrong.unwrap_err(), LoopJointError::Parameter { name: "joint".into(), kind, parameter });
+    }
+    // each constant is of one kind, and a joint of another kind says so
+    let (mut taken, mut refused) = (0, 0);
+    for (_, kind) in LoopJointKind::NAMES {
+        let made = match kind.joins_two_parts() {
+            true if kind.has("ground") => join(&world, *kind, id, Some(other), ends),
+            true => join(&world, *kind, id, Some(other), JointPlace::at(Vec3::zeros())),
+            false => joint(*kind),
+        };
+        for (parameter, change) in [
+            ("teeth", (|t| t.teeth = [3, 4]) as fn(&mut Transmission)),
+            ("radius", |t| t.radius = 0.3),
+            ("pitch", |t| t.pitch = 0.3),
+            ("ratio", |t| t.ratio = 2.0),
+        ] {
+            let changed = made.clone().with_transmission(change);
+            match kind.has(parameter) {
+                true => taken += usize::from(changed.is_ok()),
+                false => {
+                    let words = of(changed);
+                    assert!(words.contains(&format!("a {} joint has no {parameter}; kinds with it: ", kind.name())));
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert_eq!((taken, refused), (4, 4 * 14 - 4));
     let fixed = joint(LoopJointKind::Fixed);
     let changed = world.change_joint(id, |_| Ok::<(), WorldError>(()));
     assert_eq!(changed.unwrap_err().to_string(), format!("'{}' is not a loop joint", world.name(id).unwrap()));

@@ -149,6 +149,7 @@ fn moving_to_a_pose_that_is_not_a_number_is_refused() {
     for stepper in STEPPERS {
         let mut world = no_gravity(world(stepper, 1.0 / 60.0));
         let ball = unit_ball(&mut world, "ball", [0.0; 3], [0.0; 3]);
+        world.set_mode(ball, Mode::Kinematic).unwrap();
         let before = bits(&world);
         for pose in [Pose::rotation(Vec3::new(f64::NAN, 0.0, 0.0)), Pose::translation(0.0, f64::INFINITY, 0.0)] {
             assert_eq!(world.move_to(ball, pose), Err(WorldError::NotFinite("ball".into())));

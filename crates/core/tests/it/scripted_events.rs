@@ -474,6 +474,28 @@ fn a_failing_action_rolls_the_frame_back() {
     assert_eq!(world.save(), before);
 }
 
+/// A static body takes no velocity: named, it is a fault of the event; met by a contact, it is left alone.
+#[test]
+fn a_static_body_takes_no_velocity_of_an_event() {
+    let mut world = world("time_stepping", 0.01);
+    ground(&mut world, 0.0, 0.0);
+    let floor = world.ids()[0];
+    let ball = world.add(ball("ball", [0.0, 0.0, 0.2])).unwrap();
+    let kick = |body| Action::SetVelocity { body, velocity: Vec3::z(), angular_velocity: Vec3::zeros() };
+    let refused = world.add(at(1.0).with_action(kick(Subject::Part(floor, 0)))).unwrap_err().to_string();
+    assert!(refused.contains("is not dynamic or kinematic; a static body has no velocity"), "{refused}");
+    let hit = |name: &str, a, b| {
+        let trigger = Trigger::Contact { a: vec![a], b: vec![b], impulse: 0.0 };
+        ScriptedEvent::new(name, trigger).with_times(1).with_action(kick(Subject::Other))
+    };
+    let ids = [hit("meets floor", ball, floor), hit("meets ball", floor, ball)].map(|event| world.add(event).unwrap());
+    while ScriptedEvent::fired(&world, ids[1]) == Some(0) {
+        world.step().unwrap();
+    }
+    assert_eq!(ScriptedEvent::fired(&world, ids[0]), Some(1));
+    assert_eq!((velocity(&world, ball), velocity(&world, floor)), (Vec3::z(), Vec3::zeros()));
+}
+
 #[test]
 fn what_was_removed_is_left_alone() {
     let mut world = no_gravity(world("time_stepping", 0.01));

@@ -155,6 +155,6 @@ fn what_a_sensor_cannot_read_is_an_error() {
     let id = world.add(gyro()).unwrap();
     world.remove(ball).unwrap();
     world.step().unwrap();
-    assert!(world.reading(id).is_none());
+    assert!(world.reading(id).is_none() && world.object(id).is_none());
     assert!(matches!(world.add(gyro()), Err(WorldError::Stale)));
 }

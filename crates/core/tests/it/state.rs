@@ -283,3 +283,34 @@ fn two_states_of_one_object_exist_at_once() {
         assert!((sum - twice).abs() < 1e-12 * twice, "{sum} and {twice} at {x:?}");
     }
 }
+
+/// `move_to` of a body that is moved by forces would throw it.
+#[test]
+fn only_kinematic_bodies_are_moved_to_a_pose() {
+    let mut world = world("time_stepping", 1.0 / 240.0);
+    let ball = world.add(RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0)).unwrap();
+    let wall = world.add(RigidBody::fixed(cube(1.0)).with_name("wall").with_pose(Pose::translation(5.0, 0.0, 0.0)));
+    let (wall, before) = (wall.unwrap(), bits(&world));
+    for (id, name, mode, word) in [(ball, "ball", Mode::Dynamic, "dynamic"), (wall, "wall", Mode::Static, "static")] {
+        let refused = world.move_to(id, Pose::translation(1.0, 0.0, 0.0)).unwrap_err();
+        assert_eq!(refused, WorldError::NotKinematic { name: name.into(), mode });
+        assert!(refused.to_string().starts_with(&format!("body '{name}' is {word}, and move_to is for kinematic")));
+        assert_eq!(bits(&world), before);
+        world.set_mode(id, Mode::Kinematic).unwrap();
+        world.move_to(id, Pose::translation(1.0, 0.0, 0.0)).unwrap();
+        world.set_velocity(id, Vec3::zeros(), Vec3::zeros()).unwrap();
+        world.set_mode(id, mode).unwrap();
+    }
+}
+
+#[test]
+fn a_static_body_takes_no_velocity() {
+    let mut world = world("time_stepping", 1.0 / 240.0);
+    let wall = world.add(RigidBody::fixed(cube(1.0)).with_name("wall")).unwrap();
+    for [velocity, spin] in [[Vec3::x(), Vec3::zeros()], [Vec3::zeros(), Vec3::z()]] {
+        assert_eq!(world.set_velocity(wall, velocity, spin), Err(WorldError::Static("wall".into())));
+    }
+    world.set_velocity(wall, Vec3::zeros(), Vec3::zeros()).unwrap();
+    world.set_mode(wall, Mode::Kinematic).unwrap();
+    world.set_velocity(wall, Vec3::x(), Vec3::zeros()).unwrap();
+}

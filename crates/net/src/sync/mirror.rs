@@ -112,7 +112,7 @@ impl Mirror {
                     && (has_parts(&self.base, id) || o.net_sync().is_some())
             });
             if absent {
-                let _ = world.remove(id);
+                let _ = world.replica().remove(id);
             }
         }
         let mut numbers = 0;
@@ -147,13 +147,13 @@ impl Mirror {
             (false, Some(id)) => id,
             (false, None) => return Err(unfit("is not in this scene")),
             (true, old) if entry.kind == EntryKind::Exact => {
-                let _ = old.map(|id| world.remove(id));
+                let _ = old.map(|id| world.replica().remove(id));
                 let sensor = get_sensor(looks, entry.name, |k| slots.get(k)?.id, world, numbers)?;
                 world.replica().add_sensor(sensor).map_err(|why| unfit(&why.to_string()))?
             }
             (true, old) => {
                 let looks = get_looks(looks, parts as usize, entry.kind == EntryKind::Cloud, &self.base)?;
-                let _ = old.map(|id| world.remove(id));
+                let _ = old.map(|id| world.replica().remove(id));
                 let render_proxy = RenderProxy::new(entry.name, parts as usize, looks);
                 world.add_boxed(Box::new(render_proxy), Mode::Static).map_err(|why| unfit(&why.to_string()))?
             }

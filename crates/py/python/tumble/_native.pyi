@@ -219,7 +219,7 @@ class HeightField(Mesh):
     upper edge has the largest y, or of a text with a row in each line. size: of the grid along x and
     y, meters; its center is the origin of the body. thickness: distance of the bottom from the
     lowest height, meters; None: a tenth of the longer side. height_range: heights of black and white
-    in a PNG, meters.
+    in a PNG, meters, by default (0, 1); an error for other heights.
     """
     def __new__(
         cls,
@@ -325,12 +325,12 @@ class RigidBody:
     def orientation(self, value: ArrayLike) -> None: ...
     @property
     def velocity(self) -> _Floats:
-        """Velocity of the center of mass, shape (3,), m/s."""
+        """Velocity of the center of mass, shape (3,), m/s. That of a static body is zero, and another one is an error."""
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None: ...
     @property
     def angular_velocity(self) -> _Floats:
-        """Angular velocity, world axes, shape (3,), rad/s."""
+        """Angular velocity, world axes, shape (3,), rad/s. That of a static body is zero, and another one is an error."""
     @angular_velocity.setter
     def angular_velocity(self, value: ArrayLike) -> None: ...
     @property
@@ -593,7 +593,8 @@ class RigidBody:
         """
     def move_to(self, position: ArrayLike | None = None, orientation: ArrayLike | None = None) -> None:
         """Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
-        next step. An omitted argument keeps its present value.
+        next step. An omitted argument keeps its present value. An error for a dynamic or static body, which
+        ``position`` and ``orientation`` place.
         """
     def to_world(self, point: ArrayLike | None = None) -> _Floats:
         """Returns the position of a point of the body in the world. point: shape (3,), in the body's
@@ -2772,8 +2773,9 @@ class World:
         """
     @property
     def positions(self) -> _Floats:
-        """Positions of all bodies, as ``body.position``, in the order of ``bodies``: a copy of shape
-        (n, 3), m; for an articulation that of its first link. Setting it moves the rigid bodies whose
+        """Positions of all bodies, as ``body.position``, in the order of ``bodies``: a read-only copy of shape
+        (n, 3), m; for an articulation that of its first link. Setting it, as in
+        ``world.positions = world.positions + (0, 0, 1)``, moves the rigid bodies whose
         rows change and keeps their velocities; rows of articulations must stay as they are.
         """
     @positions.setter
@@ -3303,7 +3305,8 @@ class World:
         """The readings of all measuring sensors by name, after the last step."""
     def remove(self, body: _Object | Sensor) -> None:
         """Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
-        of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
+        of a removed object raise ``RemovedError``. Joints and measuring sensors of a removed body are removed with it, and
+        so are couplings and sensors of a removed joint.
         """
     def add_cloth(
         self,
@@ -3493,13 +3496,12 @@ class World:
         ``PictureError``.
         """
     def view(self, *, block: bool = False, title: str | None = None, width: int = 1280, height: int = 720) -> Window:
-        """Opens a window on the world and returns it: ``tumble.Window``. A process of its own draws the world as
+        """Opens a window on the world and returns it once it is open: ``tumble.Window``. A process of its own draws the world as
         it stands, 60 times a second, while the program steps and changes it. The window closes with the
         program.
 
         block: step the world in real time until the window is closed. title, width, height (pixels): of the
-        window. Without a desktop or a graphics adapter, ``block=True`` and later calls of ``is_open`` raise
-        ``PictureError``.
+        window. Without a desktop or a graphics adapter it raises ``PictureError`` with the reason.
         """
     def _repr_png_(self) -> bytes | None:
         """Returns a PNG for notebooks, or None without a graphics adapter."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tumble._animations import Animation, Shot, instants, write_video
-from tumble._errors import InvalidValueError, UnknownNameError
+from tumble._errors import InvalidValueError, MissingFileError, SnapshotError, UnknownNameError
 from tumble._keywords import hinted
 from tumble._native import World, read_recording, show_contacts
 from tumble._pictures import Camera
@@ -109,7 +109,7 @@ class Recording:
     ) -> None:
         """Writes the recording as a video (``.mp4`` and all that ffmpeg knows), or without ffmpeg as an animated PNG (``.png``, ``.apng``).
 
-        world: a world with the same bodies, for a recording of a world made by a program; it stays as it is. width, height: pixels. fps: images per second. speed: times
+        world: a world with the same bodies, which a recording of a world made or changed by a program, or read from a text, needs; it stays as it is. width, height: pixels. fps: images per second. speed: times
         real time. camera: by default that of the scene. Without ffmpeg or a graphics adapter: ``PictureError``.
         """
         if Path(path).suffix.lower() in (".png", ".apng"):
@@ -135,7 +135,7 @@ class Recording:
         chosen = instants(self.times, fps, speed)
         shown = world.fork() if world is not None else _world_of(self, None)
         for k in chosen:
-            shown.restore(self.states[k])
+            _restore(shown, self, k, given=world is not None)
             show_contacts(shown, self.names, self.contacts[k].tobytes())
             yield Shot(float(self.times[k]), shown.render(*size, camera=camera))
 
@@ -166,7 +166,7 @@ def replay(path: str | PathLike[str], world: World | None = None) -> Iterator[Wo
     rendered, and stepped from any frame. Different bodies raise ``SnapshotError``.
     """
     recording = read(path)
-    return _frames(_world_of(recording, world), recording)
+    return _frames(_world_of(recording, world), recording, given=world is not None)
 
 
 def _world_of(recording: Recording, world: World | None) -> World:
@@ -175,7 +175,21 @@ def _world_of(recording: Recording, world: World | None) -> World:
         return world
     if recording.world == "World":
         raise InvalidValueError("the recorded world was made by a program and not from a scene; pass a world with the same bodies as `world`")
-    return World.load(_scene_of(recording))
+    try:
+        return World.load(_scene_of(recording))
+    except MissingFileError as error:
+        raise MissingFileError(f"{error}; or pass a world with the same bodies as `world`") from error
+
+
+def _restore(world: World, recording: Recording, frame: int, *, given: bool) -> None:
+    """Sets a world to a frame."""
+    try:
+        world.restore(recording.states[frame])
+    except SnapshotError as error:
+        if given:
+            raise
+        scene = f"the recorded world had other objects than {recording.world}"
+        raise SnapshotError(f"{error}; {scene}: pass a world with the same ones as `world`") from error
 
 
 def _scene_of(recording: Recording) -> str:
@@ -186,8 +200,8 @@ def _scene_of(recording: Recording) -> str:
     return recording.world
 
 
-def _frames(world: World, recording: Recording) -> Iterator[World]:
-    for state, contacts in zip(recording.states, recording.contacts):
-        world.restore(state)
+def _frames(world: World, recording: Recording, *, given: bool) -> Iterator[World]:
+    for frame, contacts in enumerate(recording.contacts):
+        _restore(world, recording, frame, given=given)
         show_contacts(world, recording.names, contacts.tobytes())
         yield world

@@ -21,6 +21,8 @@ _INTERVAL = 1.0 / 60.0
 """Time between two frames, s."""
 _LAG = 0.1
 """Longest time that a blocking window catches up with at once, s."""
+_OPENING = 60.0
+"""Longest time that a window takes to open, s."""
 
 
 class Window:
@@ -38,13 +40,31 @@ class Window:
         command = [sys.executable, "-c", "from tumble._window import main; main()"]
         paths = [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
         own = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, env=own)
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True, env=own)
         self._messages = b""
         self._ending = threading.Event()
+        self._opened = threading.Event()
+        self._is_shown = False
         self._error: Exception | None = None
-        self._threads = [threading.Thread(target=work, daemon=True) for work in (self._listen, lambda: self._send(opening))]
+        works = (self._listen, self._await_opening, lambda: self._send(opening))
+        self._threads = [threading.Thread(target=work, daemon=True) for work in works]
         for thread in self._threads:
             thread.start()
+        try:
+            self._open()
+        except BaseException:
+            self._process.kill()
+            self.close()
+            raise
+
+    def _open(self) -> None:
+        """Waits until it is open; raises ``PictureError`` where it cannot be."""
+        if not self._opened.wait(_OPENING):
+            raise PictureError(f"the window: it did not open within {_OPENING:.0f} s")
+        if not self._is_shown:  # its process ends
+            self._process.wait(5.0)
+        _ = self.is_open
 
     @property
     def is_open(self) -> bool:
@@ -96,6 +116,15 @@ class Window:
         while piece := self._process.stderr.read(1024):
             self._messages = (self._messages + piece)[-4096:]
         self._process.stderr.close()
+
+    def _await_opening(self) -> None:
+        """Waits for the line that the window's process writes when it is open, or for its end."""
+        assert self._process.stdout is not None
+        self._is_shown = bool(self._process.stdout.readline())
+        self._opened.set()
+        while self._process.stdout.read(1024):
+            pass
+        self._process.stdout.close()
 
     def _send(self, message: bytes) -> None:
         pipe = self._process.stdin

@@ -9,6 +9,7 @@ use numpy::{
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 use std::path::PathBuf;
 use tumble::collide::{Mat3, Pose, Quat, Vec3};
 
@@ -30,6 +31,7 @@ pub struct Numbers {
 pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     let all = any_numbers(value, what)?;
     match all.data.iter().position(|x| !x.is_finite()) {
+        Some(_) if has_none(value) => Err(not_numbers(value, what)),
         Some(k) => Err(Error::value(format!("{what}: number {k} is {}; all must be finite", all.data[k]))),
         None => Ok(all),
     }
@@ -39,6 +41,7 @@ pub fn numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
 pub fn bounds(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     let all = any_numbers(value, what)?;
     match all.data.iter().any(|x| x.is_nan()) {
+        true if has_none(value) => Err(not_numbers(value, what)),
         true => Err(Error::value(format!("{what}: NaN is no bound"))),
         false => Ok(all),
     }
@@ -60,6 +63,13 @@ fn any_numbers(value: &Bound<'_, PyAny>, what: &str) -> Result<Numbers> {
     Ok(Numbers { shape, data })
 }
 
+/// Returns whether a value is None, or a list or tuple with None in it, of which numpy makes NaN.
+fn has_none(value: &Bound<'_, PyAny>) -> bool {
+    let nested = value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>();
+    let mut entries = value.try_iter().into_iter().filter(|_| nested).flatten().flatten();
+    value.is_none() || entries.any(|entry| has_none(&entry))
+}
+
 /// Returns an empty vector with room for `len` numbers, if there is enough memory.
 pub fn room(len: usize, what: &str) -> Result<Vec<f64>> {
     let mut room = Vec::new();
@@ -74,9 +84,13 @@ pub fn room(len: usize, what: &str) -> Result<Vec<f64>> {
 }
 
 fn not_numbers(value: &Bound<'_, PyAny>, what: &str) -> Error {
+    Error::value(format!("{what}: expected numbers, not {}", brief(value)))
+}
+
+/// Returns the first characters of the text of a value, for errors.
+pub fn brief(value: &Bound<'_, PyAny>) -> String {
     let shown = value.repr().map_or_else(|_| "something".into(), |r| r.to_string());
-    let shown: String = shown.chars().take(60).collect();
-    Error::value(format!("{what}: expected numbers, not {shown}"))
+    shown.chars().take(60).collect()
 }
 
 /// Converts `N` numbers in one dimension.

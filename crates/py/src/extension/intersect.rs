@@ -1,6 +1,6 @@
 //! Intersection tests written in Python.
 
-use crate::arrays::convert::{array, quaternion, some, vector};
+use crate::arrays::convert::{array, brief, quaternion, some, vector};
 use crate::errors::{Error, Result};
 use crate::extension::code::lock;
 use crate::objects::shapes::Shape;
@@ -40,8 +40,8 @@ impl Intersect for PythonTest {
             if returned.is_none() {
                 return Ok(None);
             }
-            let each = returned.try_iter()?.enumerate();
-            let each = each.map(|(number, touch)| contact(&touch?, number, &name_of(own)));
+            let Ok(each) = returned.try_iter() else { return Err(no_list(&returned, own)) };
+            let each = each.enumerate().map(|(number, touch)| contact(&touch?, number, &name_of(own)));
             each.collect::<Result<Vec<Contact>>>().map(Some)
         });
         match found {
@@ -56,6 +56,15 @@ impl Intersect for PythonTest {
             }
         }
     }
+}
+
+/// Returns the error of a test whose `contacts` returns something else than contacts.
+fn no_list(returned: &Bound<'_, PyAny>, own: &IntersectPart) -> Error {
+    Error::value(format!(
+        "the intersection test of '{}': `contacts` returned {}; expected a list of tuples (point, normal, gap), empty if nothing touches, or None, which leaves the pair to the shapes",
+        name_of(own),
+        brief(returned)
+    ))
 }
 
 fn name_of(part: &IntersectPart) -> String {
@@ -80,7 +89,9 @@ fn part<'py>(py: Python<'py>, part: &IntersectPart) -> Result<Bound<'py, PyAny>>
 /// Converts `(point, normal, gap[, feature[, core_own[, core_other]]])`.
 fn contact(touch: &Bound<'_, PyAny>, number: usize, name: &str) -> Result<Contact> {
     let wrong = |what: &str| Error::value(format!("the intersection test of '{name}': {what}"));
-    let touch = touch.cast::<PyTuple>().map_err(|_| wrong("expected tuples (point, normal, gap)"))?;
+    let touch = touch
+        .cast::<PyTuple>()
+        .map_err(|_| wrong(&format!("contact {number} is {}; expected a tuple (point, normal, gap)", brief(touch))))?;
     if !(3..=6).contains(&touch.len()) {
         return Err(wrong("expected tuples of 3 to 6 entries: point, normal, gap, feature, core_own, core_other"));
     }
@@ -88,7 +99,11 @@ fn contact(touch: &Bound<'_, PyAny>, number: usize, name: &str) -> Result<Contac
         if k >= touch.len() {
             return Ok(0.0);
         }
-        let value: f64 = touch.get_item(k)?.extract()?;
+        let entry = touch.get_item(k)?;
+        let value: f64 = entry.extract().map_err(|_| {
+            let what = ["point", "normal", "gap", "feature", "core_own", "core_other"][k];
+            wrong(&format!("{what} of contact {number} is {}; expected a number", brief(&entry)))
+        })?;
         if value.is_finite() { Ok(value) } else { Err(wrong("a number that is not finite")) }
     };
     let vector_at = |k: usize, what| Ok::<_, Error>(Vec3::from(some::<3>(&touch.get_item(k)?, what)?));
@@ -98,7 +113,12 @@ fn contact(touch: &Bound<'_, PyAny>, number: usize, name: &str) -> Result<Contac
     if core_a < 0.0 || core_b < 0.0 {
         return Err(wrong("a core distance below 0"));
     }
-    let feature = if touch.len() > 3 { touch.get_item(3)?.extract()? } else { number as u64 };
+    let feature = match touch.get_item(3) {
+        Ok(entry) => entry.extract().map_err(|_| {
+            wrong(&format!("feature of contact {number} is {}; expected a whole number from 0", brief(&entry)))
+        })?,
+        Err(_) => number as u64,
+    };
     let normal_from = match (core_a > 0.0, core_b > 0.0) {
         (false, _) => NormalFrom::FaceOfA,
         (true, false) => NormalFrom::FaceOfB,

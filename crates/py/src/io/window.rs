@@ -6,6 +6,8 @@
 //! | kind: 0 opening, 1 object table, 2 frame | 1 |
 //! | number of the frame, simulated time (s), length of the rest, little-endian | 8, 8, 4 |
 //! | title, size and views in postcard; a NetSync snapshot; a NetSync state | any |
+//!
+//! The process of the window writes one line when the window is open, and the reason where it cannot be to stderr.
 
 use crate::arrays::whole;
 use crate::errors::{Error, Result};
@@ -15,7 +17,7 @@ use crate::world::pickling::SceneRecord;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -208,6 +210,8 @@ impl WindowApp for App {
 
     fn opened(&mut self, screen: &mut Screen) -> Result<()> {
         self.pictures.open(screen);
+        // the program waits for this line; without it the window is still open
+        let _ = writeln!(std::io::stdout(), "open");
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use tumble::collide::{Mat3, Pose, Vec3};
-use tumble::dynamics::{LockedAxes, Mode, RigidBody as Rigid};
+use tumble::dynamics::{LockedAxes, Mode, RigidBody as Rigid, Status};
 
 /// A rigid body, or static geometry, of a world. Its frame is that of its shape, for a mesh that of
 /// its file. All vectors are in world axes.
@@ -178,7 +178,7 @@ impl RigidBody {
         self.set_place(py, |now| Pose::from_parts(now.translation, rotation))
     }
 
-    /// Velocity of the center of mass, shape (3,), m/s.
+    /// Velocity of the center of mass, shape (3,), m/s. That of a static body is zero, and another one is an error.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.place.center_state()?.velocity))
@@ -189,7 +189,7 @@ impl RigidBody {
         self.set_motion(py, Some(vec3(value, "velocity")?), None)
     }
 
-    /// Angular velocity, world axes, shape (3,), rad/s.
+    /// Angular velocity, world axes, shape (3,), rad/s. That of a static body is zero, and another one is an error.
     #[getter]
     fn angular_velocity<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray1<f64>>> {
         Ok(vector(py, &self.place.center_state()?.angular_velocity))
@@ -544,7 +544,8 @@ impl RigidBody {
     }
 
     /// Sets the velocity of a kinematic body such that its frame reaches a pose at the end of the
-    /// next step. An omitted argument keeps its present value.
+    /// next step. An omitted argument keeps its present value. An error for a dynamic or static body, which
+    /// ``position`` and ``orientation`` place.
     #[pyo3(signature = (position=None, orientation=None, **unknown), text_signature = "($self, position=None, orientation=None)")]
     fn move_to(
         &self,
@@ -556,6 +557,13 @@ impl RigidBody {
         keywords::check(unknown, "RigidBody.move_to")?;
         let target = pose(position, orientation)?;
         let (moves, turns) = (position.is_some(), orientation.is_some());
+        let Status { mode, .. } = self.place.status()?;
+        if mode != Mode::Kinematic {
+            return Err(Error::value(format!(
+                "body '{}' is {mode}, and move_to is for kinematic bodies: set `position` and `orientation` to place it, or add it with `kinematic=True`",
+                self.place.name
+            )));
+        }
         self.place.write(py, |inner| {
             let now = inner.world.pose(self.place.id, 0).ok_or_else(|| self.place.removed())?;
             let translation = if moves { target.translation } else { now.translation };

@@ -406,7 +406,7 @@ fn compound_part(n: usize, part: &Bound<'_, PyAny>) -> Result<CompoundPart> {
     let wrong = || {
         let expected =
             "expected (shape, position), (shape, position, orientation) or (shape, position, orientation, density)";
-        Error::value(format!("part {n} of a compound: {expected}"))
+        Error::value(format!("part {} of a compound: {expected}", n + 1))
     };
     let fields: Vec<Bound<'_, PyAny>> = part.extract().map_err(|_| wrong())?;
     let [shape, position, rest @ ..] = fields.as_slice() else { return Err(wrong()) };

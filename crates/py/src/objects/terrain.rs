@@ -92,7 +92,7 @@ fn read_open(py: Python<'_>, file: &Path) -> Result<TriMesh> {
 /// upper edge has the largest y, or of a text with a row in each line. size: of the grid along x and
 /// y, meters; its center is the origin of the body. thickness: distance of the bottom from the
 /// lowest height, meters; None: a tenth of the longer side. height_range: heights of black and white
-/// in a PNG, meters.
+/// in a PNG, meters, by default (0, 1); an error for other heights.
 #[pyclass(frozen, extends = Mesh, module = "tumble")]
 pub struct HeightField;
 
@@ -116,6 +116,13 @@ impl HeightField {
         let thickness = thickness.map(|thickness| number(thickness, "thickness")).transpose()?;
         let range = height_range.map_or(Ok([0.0, 1.0]), |range| some::<2>(range, "height_range"))?;
         let file = heights.extract::<std::path::PathBuf>().ok();
+        let is_image = file.as_ref().and_then(|file| file.extension()).is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        if height_range.is_some() && !is_image {
+            let given = file.map_or("an array".into(), |file| file.display().to_string());
+            return Err(Error::value(format!(
+                "height_range: expected heights of a PNG, got {given}, which has heights in meters"
+            )));
+        }
         let (values, columns) = match &file {
             Some(file) => {
                 let read = || read_heights(file, &read_mesh_bytes(file)?, range);

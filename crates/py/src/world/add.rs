@@ -64,7 +64,10 @@ pub fn rigid(name: &str, shape: &Shape, mass: Option<f64>, density: Option<f64>,
         }
         (None, Some(density)) => Ok(body.with_density(density)),
         (None, None) => Ok(body),
-        (Some(_), Some(_)) => Err(Error::value(format!("body '{name}': expected a mass or a density, not both"))),
+        (Some(_), Some(_)) => {
+            let body = if name.is_empty() { "the new body".into() } else { format!("body '{name}'") };
+            Err(Error::value(format!("{body}: expected a mass or a density, not both")))
+        }
     }
 }
 

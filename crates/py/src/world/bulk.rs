@@ -7,7 +7,7 @@ use crate::world::inner::Inner;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use tumble::collide::{Pose, Vec3};
-use tumble::dynamics::{BodyView, ObjectId, RigidBody as Rigid};
+use tumble::dynamics::{BodyView, Mode, ObjectId, RigidBody as Rigid, WorldError};
 
 /// A quantity of all bodies.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -68,10 +68,12 @@ pub fn get(inner: &Inner, bulk: Bulk) -> Result<Vec<f64>> {
     Ok(out)
 }
 
-/// Returns rows as an array.
+/// Returns rows as an array. It is read-only: a row that is written into a copy would change nothing.
 pub fn array(py: Python<'_>, bulk: Bulk, rows: Vec<f64>) -> Result<Bound<'_, PyArray2<f64>>> {
     let shape = [rows.len() / bulk.width(), bulk.width()];
-    Ok(PyArray1::from_vec(py, rows).reshape(shape)?)
+    let array = PyArray1::from_vec(py, rows).reshape(shape)?;
+    array.call_method1("setflags", (false,))?;
+    Ok(array)
 }
 
 /// Writes a quantity of all bodies, or nothing on an error. Rows that stay as they are wake nothing.
@@ -90,6 +92,10 @@ pub fn set(inner: &mut Inner, bulk: Bulk, value: Numbers) -> Result<()> {
         if inner.world.get::<Rigid>(id).is_none() {
             let body = inner.world.name(id).unwrap_or_default();
             return Err(Error::value(format!("{name}: '{body}' is an articulation; set its q and qd instead")));
+        }
+        let fixed = inner.world.status(id).is_some_and(|status| status.mode == Mode::Static);
+        if fixed && matches!(bulk, Bulk::Velocities | Bulk::AngularVelocities) && row.iter().any(|x| *x != 0.0) {
+            return Err(WorldError::Static(inner.world.name(id).unwrap_or_default().into()).into());
         }
         let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
         if bulk == Bulk::Orientations && (norm - 1.0).abs() > 1e-6 {

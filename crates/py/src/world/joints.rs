@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 use tumble::collide::Vec3;
-use tumble::dynamics::{DofSettings, Drive, JointPlace, LoopJoint, LoopJointKind, ObjectId, Spring};
+use tumble::dynamics::{DofSettings, Drive, JointPlace, LoopJoint, LoopJointError, LoopJointKind, ObjectId, Spring};
 
 /// The arguments of ``add_joint``.
 pub struct Arguments<'a, 'py> {
@@ -46,12 +46,48 @@ pub struct Arguments<'a, 'py> {
     pub angle: Option<f64>,
 }
 
+impl Arguments<'_, '_> {
+    /// Returns the names of the arguments that have another value than by default, of those that not all kinds have.
+    fn parameters(&self) -> Vec<&'static str> {
+        let given = [
+            ("second_point", self.points[1].is_some()),
+            ("second_axis", self.axes[1].is_some()),
+            ("length", self.length.is_some()),
+            ("teeth", self.teeth.is_some()),
+            ("radius", self.radius.is_some()),
+            ("pitch", self.pitch.is_some()),
+            ("ratio", self.ratio != 1.0),
+            ("ground", self.ground.is_some()),
+            ("cone", self.cone.is_some()),
+            ("twist_limits", self.twist_limits.is_some()),
+            ("limits", self.limits.is_some()),
+            ("drive", self.drive.is_some()),
+            ("stiffness", self.stiffness != 0.0),
+            ("rest", self.rest.is_some()),
+            ("damping", self.damping != 0.0),
+            ("friction", self.friction != 0.0),
+            ("max_velocity", self.max_velocity.is_some()),
+            ("effort", self.effort.is_some()),
+            ("armature", self.armature != 0.0),
+            ("dofs", self.dofs.is_some()),
+            ("angle", self.angle.is_some()),
+        ];
+        given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+    }
+}
+
 /// Adds a joint and returns its handle.
 pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> Result<Joint> {
     if given.kind == "mimic" {
         return Err(Error::value("kind: `mimic` couples coordinates and is made by World.add_mimic"));
     }
     let kind = meaning("kind", given.kind, LoopJointKind::NAMES)?;
+    if kind == LoopJointKind::Spherical && given.limits.is_some() {
+        return Err(Error::value("limits: a spherical joint has a cone and twist_limits"));
+    }
+    if let Some(parameter) = given.parameters().into_iter().find(|parameter| !kind.has(parameter)) {
+        return Err(LoopJointError::Parameter { name: given.name.into(), kind, parameter }.into());
+    }
     let [a, b] = given.sides.map(|value| value.map(|value| side(shared, value)).transpose());
     let (a, b) = (a?, b?);
     let effort = given.effort.unwrap_or(f64::INFINITY);
@@ -81,9 +117,6 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
     }
     let missing = |what: &str| Err(Error::value(format!("{what}: a {} needs it", kind.name())));
     match kind {
-        LoopJointKind::Spherical if given.limits.is_some() => {
-            return Err(Error::value("limits: a spherical joint has a cone and twist_limits"));
-        }
         LoopJointKind::Gear if given.teeth.is_none() => return missing("teeth"),
         LoopJointKind::Rack if given.radius.is_none() => return missing("radius"),
         LoopJointKind::Rack if given.axes[1].is_none() => return missing("second_axis"),
@@ -110,7 +143,7 @@ pub fn add(shared: &Arc<Shared>, py: Python<'_>, given: &Arguments<'_, '_>) -> R
             joint.set_length(length)?;
         }
         let at_rest = if kind.has_length() { joint.length() } else { 0.0 };
-        let springs = given.stiffness != 0.0 || kind == LoopJointKind::Spring;
+        let springs = given.stiffness != 0.0 || given.rest.is_some() || kind == LoopJointKind::Spring;
         let (damping, friction) = (given.damping, given.friction);
         let max_velocity = given.max_velocity.unwrap_or(f64::INFINITY);
         let dof = |(drive, rest): &(Drive, Option<f64>)| {
@@ -180,13 +213,24 @@ pub fn all(shared: &Arc<Shared>, py: Python<'_>) -> Result<Vec<Joint>> {
     places.into_iter().map(|(id, name)| Joint::new(py, Place { shared: shared.clone(), id, name })).collect()
 }
 
+/// Returns the names of the first joints of a world.
+pub fn names(inner: &Inner) -> Vec<&str> {
+    let ids = inner.world.ids().iter().filter(|id| inner.world.get::<LoopJoint>(**id).is_some());
+    ids.filter_map(|id| inner.world.name(*id)).take(8).collect()
+}
+
 /// Returns the place of the joint of that name.
 pub fn place_by_name(shared: &Arc<Shared>, name: &str) -> Result<Place> {
     shared.read(|inner| {
         let id = inner.world.find(name).filter(|id| inner.world.get::<LoopJoint>(*id).is_some());
         match id {
             Some(id) => Ok(Place { shared: shared.clone(), id, name: name.into() }),
-            None => Err(Error::Name(format!("the world has no joint named '{name}'"))),
+            None => {
+                let names = names(inner);
+                let known =
+                    if names.is_empty() { "it has none".into() } else { format!("there are {}", names.join(", ")) };
+                Err(Error::Name(format!("the world has no joint named '{name}'; {known}")))
+            }
         }
     })
 }

@@ -20,11 +20,20 @@ enum Named {
 
 impl Named {
     /// Converts a joint, or the link of an articulation that a joint moves.
-    fn of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>) -> Result<Named> {
-        match joints::place_of(shared, value)? {
-            Some(place) => Ok(Named::LoopJoint(place.id)),
-            None => target(shared, value).map(Named::Link),
+    fn of(shared: &Arc<Shared>, value: &Bound<'_, PyAny>, argument: &str) -> Result<Named> {
+        if let Some(place) = joints::place_of(shared, value)? {
+            return Ok(Named::LoopJoint(place.id));
         }
+        match value.extract::<String>() {
+            Ok(name) if !name.contains('/') => shared.read(|inner| match inner.world.find(&name) {
+                Some(_) => Ok(()),
+                None => {
+                    Err(Error::Name(format!("{argument}: the world has no joint named '{name}'; {}", known(inner))))
+                }
+            })?,
+            _ => {}
+        }
+        target(shared, value).map(Named::Link)
     }
 
     fn joint(&self, inner: &Inner, argument: &str) -> Result<JointRef> {
@@ -32,6 +41,16 @@ impl Named {
             Named::LoopJoint(id) => Ok(JointRef::LoopJoint(*id)),
             Named::Link(target) => sensors::dof_of(inner, target, argument).map(|(body, dof)| JointRef::Dof(body, dof)),
         }
+    }
+}
+
+/// Returns the words about the joints that can be coupled.
+fn known(inner: &Inner) -> String {
+    let names = joints::names(inner);
+    let links = "a joint of an articulation is named by its link, \"ARTICULATION/LINK\"";
+    match names.is_empty() {
+        true => format!("it has none that add_joint made; {links}"),
+        false => format!("there are {}; {links}", names.join(", ")),
     }
 }
 
@@ -43,7 +62,7 @@ pub fn add(
     [multiplier, offset]: [f64; 2],
     name: &str,
 ) -> Result<Mimic> {
-    let (joint, of) = (Named::of(shared, joint)?, Named::of(shared, of)?);
+    let (joint, of) = (Named::of(shared, joint, "joint")?, Named::of(shared, of, "of")?);
     let place = shared.write(py, |inner| {
         let joints = [joint.joint(inner, "joint")?, of.joint(inner, "of")?];
         let mimic = Core::between(name, &inner.world, joints, multiplier, offset)?;

@@ -69,6 +69,13 @@ impl<'a> Fields<'a> {
         self.table.get(key)
     }
 
+    /// Returns the value of a key that nothing has asked for yet, and counts it as asked for.
+    pub(crate) fn unread(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
+        let value = self.table.get(key).filter(|_| !self.asked.contains(&key))?;
+        self.asked.push(key);
+        Some(value)
+    }
+
     /// Returns name, place and value of every entry, whatever its name.
     pub(crate) fn entries(&self) -> impl Iterator<Item = (&'a str, Range<usize>, &'a Value<'a>)> + use<'a> {
         self.table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value))

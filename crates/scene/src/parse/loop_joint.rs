@@ -202,6 +202,7 @@ impl LoopJointSpec {
         let enabled = f.flag_or("enabled", true);
         let expected = "a part other than `a`; or no `b`, which is the world";
         let sides = parts.sides(&f, [a, b], |name| parts.part(name), expected);
+        refuse_foreign(&mut f, kind);
         f.finish();
         Some(LoopJointSpec {
             name,
@@ -281,12 +282,9 @@ fn read_dofs(f: &mut Fields<'_>, kind: LoopJointKind, axis: Vec3) -> Vec<LoopDof
         joints[0].dof.spring = Some(Spring { stiffness, rest: 0.0 });
     }
     let springs = kind != LoopJointKind::Spring;
-    match joints.first_mut() {
-        Some(first) => {
-            first.read_loop_dof(f, springs, kind.has_length(), spherical);
-            check_angle(f, kind, 0);
-        }
-        None => refuse_settings(f, kind),
+    if let Some(first) = joints.first_mut() {
+        first.read_loop_dof(f, springs, kind.has_length(), spherical);
+        check_angle(f, kind, 0);
     }
     if spherical {
         let first = joints[0].clone();
@@ -328,20 +326,46 @@ fn check_angle(f: &mut Fields<'_>, kind: LoopJointKind, k: usize) {
     }
 }
 
-/// Reports settings of a position of a kind that has none.
-fn refuse_settings(f: &mut Fields<'_>, kind: LoopJointKind) {
-    for key in ["drive", "spring", "limits_rad", "limits_deg", "limits_m"] {
-        let given = f.entries().find(|(name, ..)| *name == key).and_then(|_| f.value(key));
-        if let Some(value) = given {
-            let positioned = LoopJointKind::NAMES.iter().filter(|(_, kind)| kind.has_position());
-            let names: Vec<&str> = positioned.map(|(name, _)| *name).collect();
-            let none = format!(
-                "no `{key}` of type \"{}\", which has no position; types with one: {}",
-                kind.name(),
-                names.join(", ")
-            );
-            f.wrong(key, value, none);
-        }
+/// Keys that not all kinds have, with the names of their parameters in [`LoopJointKind::has`].
+const OF_SOME_KINDS: [(&str, &str); 30] = [
+    ("second_position_m", "second_point"),
+    ("second_axis", "second_axis"),
+    ("length_m", "length"),
+    ("teeth", "teeth"),
+    ("radius_m", "radius"),
+    ("pitch_m", "pitch"),
+    ("ratio", "ratio"),
+    ("ground_position_m", "ground"),
+    ("second_ground_position_m", "ground"),
+    ("cone_rad", "cone"),
+    ("cone_deg", "cone"),
+    ("twist_limits_rad", "twist_limits"),
+    ("twist_limits_deg", "twist_limits"),
+    ("angle_rad", "angle"),
+    ("angle_deg", "angle"),
+    ("limits_rad", "limits"),
+    ("limits_deg", "limits"),
+    ("limits_m", "limits"),
+    ("drive", "drive"),
+    ("spring", "stiffness"),
+    ("damping_n_m_s_per_rad", "damping"),
+    ("damping_n_s_per_m", "damping"),
+    ("friction_n_m", "friction"),
+    ("friction_n", "friction"),
+    ("max_velocity_rad_per_s", "max_velocity"),
+    ("max_velocity_m_per_s", "max_velocity"),
+    ("effort_n_m", "effort"),
+    ("effort_n", "effort"),
+    ("armature_kg_m2", "armature"),
+    ("armature_kg", "armature"),
+];
+
+/// Reports keys that joints of a kind do not have.
+fn refuse_foreign(f: &mut Fields<'_>, kind: LoopJointKind) {
+    for (key, parameter) in OF_SOME_KINDS.into_iter().filter(|(_, parameter)| !kind.has(parameter)) {
+        let Some(value) = f.unread(key) else { continue };
+        let types = LoopJointKind::names_with(parameter).join(", ");
+        f.wrong(key, value, format!("no `{key}` of type \"{}\"; types with it: {types}", kind.name()));
     }
 }
 

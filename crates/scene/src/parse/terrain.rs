@@ -79,7 +79,12 @@ pub(super) fn read_height_field(f: &mut Fields<'_>, folder: &Path) -> Option<Mes
         }
         None => {
             let range_m = f.vector_or("height_range_m", Bound::ANY, [0.0, 1.0]);
-            Heights::File { path: read_height_path(f, folder)?, range_m }
+            let path = read_height_path(f, folder)?;
+            let is_image = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+            if let (false, Some(value)) = (is_image, f.value("height_range_m")) {
+                f.wrong("height_range_m", value, "none: heights of a text are in meters; a .png has a range");
+            }
+            Heights::File { path, range_m }
         }
     };
     Some(MeshSource::HeightField { heights, size_m, thickness_m })

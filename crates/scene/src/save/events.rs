@@ -194,6 +194,7 @@ impl Writer<'_> {
     /// Writes a measuring sensor.
     pub(super) fn sensor(&mut self, name: &str, sensor: &Sensor, enabled: bool) {
         let kind = sensor.kind();
+        let title = format!("the sensor \"{name}\"");
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
         let on = match sensor.place() {
@@ -202,7 +203,7 @@ impl Writer<'_> {
                 None
             }
             SensorPlace::Site(anchor) => {
-                let (part, frame) = self.anchor(anchor);
+                let (part, frame) = self.anchor(&title, anchor);
                 t.put_pose(&frame);
                 part
             }
@@ -211,7 +212,7 @@ impl Writer<'_> {
         };
         on.iter().for_each(|on| t.put("on", on));
         if let Some(reference) = sensor.reference() {
-            self.anchor(reference).0.iter().for_each(|part| t.put("relative_to", part));
+            self.anchor(&title, reference).0.iter().for_each(|part| t.put("relative_to", part));
         }
         if let Some(volume) = sensor.volume() {
             t.put("volume", self.meshes.shape(volume));

@@ -20,7 +20,8 @@ impl Writer<'_> {
         let mut t = Table::of("name", name);
         t.put("type", kind.name());
         let [a, b] = joint.sides();
-        let ((part_a, frame_a), (part_b, frame_b)) = (self.anchor(&a), self.anchor(&b));
+        let title = format!("the loop joint \"{name}\"");
+        let ((part_a, frame_a), (part_b, frame_b)) = (self.anchor(&title, &a), self.anchor(&title, &b));
         part_a.iter().for_each(|a| t.put("a", a));
         part_b.iter().for_each(|b| t.put("b", b));
         t.put("anchor_a", pose(&frame_a));
@@ -116,12 +117,12 @@ impl Writer<'_> {
     }
 
     /// Returns the name of the part of a side, and its frame in the frame of the body or link;
-    /// no name for the world.
-    pub(super) fn anchor(&mut self, side: &Anchor) -> (Option<String>, Pose) {
+    /// no name for the world. `title` is the joint or sensor, for faults.
+    pub(super) fn anchor(&mut self, title: &str, side: &Anchor) -> (Option<String>, Pose) {
         let Anchor { part, frame, link: named } = side;
         let Some((id, part)) = *part else { return (None, *frame) };
         let Some(name) = self.world.name(id).map(str::to_owned) else {
-            self.fault("a loop joint of an object that was removed".into());
+            self.fault(format!("{title} on an object that was removed"));
             return (None, *frame);
         };
         let Some(body) = self.world.get::<ArticulatedBody>(id) else {
@@ -139,7 +140,7 @@ impl Writer<'_> {
         match named.or_else(|| link_name(body, part)) {
             Some((link, pose)) => (Some(format!("{name}/{link}")), pose.inverse() * on_link),
             None => {
-                self.fault(format!("a joint on the base of \"{name}\", which has no link that is fixed to its base"));
+                self.fault(format!("{title} on the base of \"{name}\", which has no link that is fixed to its base"));
                 (None, *frame)
             }
         }

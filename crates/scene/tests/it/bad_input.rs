@@ -683,7 +683,32 @@ fn settings_of_joints_without_a_position() {
         &joint_with(&format!("{gear}drive = {{ type = \"velocity\", target_rad_per_s = 1 }}")),
         &[&format!(
             "s.toml:18:9: `drive` of loop_joint \"j\" is {{ type = \"velocity\", target_rad_per_s = 1 }}; expected no `drive` of \
-             type \"gear\", which has no position; types with one: {types}"
+             type \"gear\"; types with it: {types}"
         )],
     );
+    // each key that a type does not have, in turn: the types that have it
+    for (kind, key, value, types) in [
+        ("revolute", "pitch_m", "0.1", "screw"),
+        ("revolute", "teeth", "[1, 2]", "gear"),
+        ("revolute", "radius_m", "0.1", "rack"),
+        ("revolute", "ratio", "2", "pulley"),
+        ("revolute", "second_ground_position_m", "[1, 0, 0]", "pulley"),
+        ("revolute", "second_position_m", "[1, 0, 0]", "distance, rope, spring, pulley"),
+        ("revolute", "second_axis", "[1, 0, 0]", "spherical, universal, planar, gear, rack"),
+        ("revolute", "length_m", "1", "distance, rope, spring, pulley"),
+        ("revolute", "cone_rad", "1", "spherical"),
+        ("prismatic", "angle_rad", "1", "revolute"),
+        ("gear", "damping_n_m_s_per_rad", "1", types),
+        ("gear", "friction_n", "1", types),
+        ("gear", "effort_n_m", "1", types),
+        ("gear", "armature_kg_m2", "1", "revolute, prismatic, spherical, cylindrical, universal, planar, screw"),
+    ] {
+        let teeth = if kind == "gear" { "teeth = [2, 3]\n" } else { "" };
+        let joint = format!("type = \"{kind}\"\nposition_m = [0, 0, 1]\naxis = [0, 0, 1]\n{teeth}{key} = {value}");
+        let error = SceneFile::parse(&joint_with(&joint), "s.toml").unwrap_err().to_string();
+        let expected = format!(
+            "`{key}` of loop_joint \"j\" is {value}; expected no `{key}` of type \"{kind}\"; types with it: {types}"
+        );
+        assert!(error.contains(&expected), "{error}");
+    }
 }

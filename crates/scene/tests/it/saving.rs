@@ -328,11 +328,19 @@ fn add_joints(world: &mut World) {
         let a = world.add(body("a", -0.6)).unwrap();
         let b = world.add(body("b", 0.6)).unwrap();
         let second = at + Vec3::new(0.5, 0.1, 0.0);
-        let place = JointPlace { second_point: Some(second), axis: Vec3::new(0.0, 0.6, 0.8), ..JointPlace::at(at) };
-        let place = JointPlace { second_axis: Some(Vec3::x()), ground: [at + Vec3::z(), second + Vec3::z()], ..place };
+        let second_point = kind.has("second_point").then_some(second);
+        let place = JointPlace { second_point, axis: Vec3::new(0.0, 0.6, 0.8), ..JointPlace::at(at) };
+        let ground = if kind.has("ground") { [at + Vec3::z(), second + Vec3::z()] } else { place.ground };
+        let place = JointPlace { second_axis: Some(Vec3::x()), ground, ..place };
         let joint =
             LoopJoint::joining(format!("joint {name}"), *kind, world, Some((a, 0)), Some((b, 0)), place).unwrap();
-        let constants = joint.with_transmission(|t| (t.teeth, t.radius, t.pitch, t.ratio) = ([3, -7], 0.2, 0.05, 2.0));
+        let constants = joint.with_transmission(|t| match kind {
+            LoopJointKind::Gear => t.teeth = [3, -7],
+            LoopJointKind::Rack => t.radius = 0.2,
+            LoopJointKind::Screw => t.pitch = 0.05,
+            LoopJointKind::Pulley => t.ratio = 2.0,
+            _ => {}
+        });
         let mut joint = constants.unwrap().with_breaking_force(5e3).unwrap();
         if kind.has_position() {
             let mut dof = DofSettings { damping: 0.3, friction: 0.02, max_velocity: 9.0, ..joint.dof().clone() };

@@ -89,6 +89,9 @@ fn height_fields_of_lists_images_and_texts_have_their_heights() {
     }
     let range = scene("type = \"height_field\"\nfile = \"map.png\"\nheight_range_m = [10, 30]\nsize_m = [4, 2]");
     assert!((folder.height(&range, -1.9999, 0.9999) - 30.0).abs() < 0.01);
+    let wrong = scene("type = \"height_field\"\nfile = \"map.txt\"\nheight_range_m = [10, 30]\nsize_m = [4, 2]");
+    let error = folder.load(&wrong).unwrap_err().to_string();
+    assert!(error.contains("height_range_m") && error.contains("heights of a text are in meters"), "{error}");
 }
 
 #[test]

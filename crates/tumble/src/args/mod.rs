@@ -256,7 +256,7 @@ pub struct SphereTreeOptions {
     /// Repair holes and dangling parts before building. Notes list the repairs.
     #[arg(long, conflicts_with = "urdf")]
     pub repair: bool,
-    /// Write the tree (JSON), or the URDF of spheres.
+    /// Write the tree (JSON), or with --urdf the URDF of spheres, to a file that ends in .urdf or .xml.
     #[arg(long, short, value_name = "FILE", visible_alias = "json")]
     pub output: Option<PathBuf>,
     /// Write a picture (PNG) of a level over the mesh.

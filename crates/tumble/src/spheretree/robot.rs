@@ -42,6 +42,9 @@ pub fn spherize(path: &Path, options: &SphereTreeOptions) -> Result<(), Failure>
             ..UrdfOptions::default()
         },
     };
+    if let Some(output) = &options.output {
+        check_urdf(output)?;
+    }
     let planner = planner_file(path, options)?;
     if let Some((file, _)) = &planner {
         check_writable(file).map_err(Failure::input)?;
@@ -81,6 +84,20 @@ fn per_link<T: Copy>(given: &[(Option<String>, T)], common: T) -> PerLink<T> {
         }
     }
     values
+}
+
+/// Checks the name of the robot of spheres: a list for planners has another ending, so that neither replaces the other.
+fn check_urdf(output: &Path) -> Result<(), Failure> {
+    match output.extension() {
+        Some(ending) if !["urdf", "xml"].iter().any(|known| ending.eq_ignore_ascii_case(known)) => {
+            Err(Failure::input(format!(
+                "--output {}: the robot of spheres is written as URDF; expected a file that ends in .urdf or .xml. A list for \
+                 planners is --planner {0}",
+                output.display()
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Returns the file of the planner's list, and whether it is YAML. A bare format names a file

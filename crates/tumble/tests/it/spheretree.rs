@@ -153,6 +153,11 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
         ),
         (&["--urdf", &robot, "--pose", "j"], "expected zero, or JOINT=POSITION"),
         (&["--urdf", &robot, "--pose", "k=1"], "there is no joint \"k\" to set; the joints are j"),
+        (
+            &["--urdf", &robot, "--output", "o.yaml", "--planner", "yaml"],
+            "--output o.yaml: the robot of spheres is written as URDF",
+        ),
+        (&["--urdf", &robot, "--output", "o.json", "--planner", "json"], "A list for planners is --planner o.json"),
         (&["--urdf", &robot, "--planner", "yaml"], "needs --output, or a file such as --planner robot.yaml"),
     ];
     for (words, said) in cases {

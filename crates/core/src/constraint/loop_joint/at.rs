@@ -28,6 +28,11 @@ impl Anchor {
     pub fn on(id: ObjectId, part: usize, frame: Pose) -> Anchor {
         Anchor { part: Some((id, part)), frame, link: None }
     }
+
+    /// Returns whether it is fixed to a part of an object.
+    pub(crate) fn is_on(&self, other: ObjectId) -> bool {
+        self.part.is_some_and(|(id, _)| id == other)
+    }
 }
 
 /// The place of a joint, in the world at present.
@@ -35,7 +40,7 @@ impl Anchor {
 pub struct JointPlace {
     /// Origin of both frames, or of A's frame for kinds with a length, m.
     pub point: Vec3,
-    /// Origin of B's frame, m; `None` for `point`.
+    /// Origin of B's frame, m, of gears, racks and kinds with a length; `None` for `point`.
     pub second_point: Option<Vec3>,
     /// The z axis of both frames, of any length above 0.
     pub axis: Vec3,
@@ -43,7 +48,7 @@ pub struct JointPlace {
     /// world that follows, in the order x, y, z, x, the one nearest to `axis`. For a universal joint
     /// the axis that is fixed to B; for gears and racks the z axis of B, `axis` by default.
     pub second_axis: Option<Vec3>,
-    /// Points of the world over which the rope of a pulley runs, m.
+    /// Points of the world over which the rope of a pulley runs, m; zero for other kinds.
     pub ground: [Vec3; 2],
 }
 
@@ -103,6 +108,9 @@ impl LoopJoint {
         let directions = [Some(axis), second_axis].into_iter().flatten();
         if [point, second_point].into_iter().chain(ground).chain(directions).any(|v| v.iter().any(|x| !x.is_finite())) {
             return Err(LoopJointError::NotFinite(name));
+        }
+        if second_point != point && !(kind.has_length() || own_axes) {
+            return Err(LoopJointError::Parameter { name, kind, parameter: "second_point" });
         }
         let rotations = [rotation(&name, axis, second_x)?, rotation(&name, second_z, second_x)?];
         let points = [point, if kind.has_length() || own_axes { second_point } else { point }];

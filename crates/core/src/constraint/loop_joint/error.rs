@@ -1,20 +1,23 @@
 //! Errors of loop joints.
 
+use super::LoopJointKind;
+use crate::titled::titled;
+
 /// Why a loop joint cannot be made or changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoopJointError {
     /// Both sides are the world.
-    #[error("loop joint '{0}' joins the world to itself; one side must be a part of an object")]
+    #[error("{} joins the world to itself; one side must be a part of an object", titled("loop joint", .0))]
     NoPart(String),
     /// Both sides are the same part.
-    #[error("loop joint '{0}' joins a part to itself; its sides must be two parts, or a part and the world")]
+    #[error("{} joins a part to itself; its sides must be two parts, or a part and the world", titled("loop joint", .0))]
     SamePart(String),
     /// A gear, a rack or a pulley has one side only.
-    #[error("loop joint '{0}': a {1} joins two parts, and one side is the world")]
+    #[error("{}: a {} joins two parts, and one side is the world", titled("loop joint", .0), .1)]
     OnePart(String, &'static str),
     /// The object or part of a side does not exist.
-    #[error("loop joint '{name}': there is no such object, or it has no part {part}")]
+    #[error("{}: there is no such object, or it has no part {part}", titled("loop joint", name))]
     Gone {
         /// Loop joint.
         name: String,
@@ -22,16 +25,16 @@ pub enum LoopJointError {
         part: usize,
     },
     /// A frame, point or axis is not finite.
-    #[error("loop joint '{0}': a frame, point or axis is not finite")]
+    #[error("{}: a frame, point or axis is not finite", titled("loop joint", .0))]
     NotFinite(String),
     /// The axis has length 0.
-    #[error("loop joint '{0}': the axis has length 0; it must have a direction")]
+    #[error("{}: the axis has length 0; it must have a direction", titled("loop joint", .0))]
     Axis(String),
     /// The two axes are parallel.
-    #[error("loop joint '{0}': its two axes are parallel; expected perpendicular ones")]
+    #[error("{}: its two axes are parallel; expected perpendicular ones", titled("loop joint", .0))]
     Parallel(String),
     /// A setting is out of its range.
-    #[error("loop joint '{name}': {what} is {value}; it must be {expected}")]
+    #[error("{}: {what} is {value}; it must be {expected}", titled("loop joint", name))]
     Range {
         /// Loop joint.
         name: String,
@@ -43,7 +46,7 @@ pub enum LoopJointError {
         expected: &'static str,
     },
     /// The kind of joint has fewer degrees of freedom.
-    #[error("loop joint '{name}': there is no degree of freedom {dof}; a {kind} joint has {count}, from 0")]
+    #[error("{}: there is no degree of freedom {dof}; a {kind} joint has {count}, from 0", titled("loop joint", name))]
     NoDof {
         /// Loop joint.
         name: String,
@@ -55,7 +58,7 @@ pub enum LoopJointError {
         count: usize,
     },
     /// The kind of joint has no such setting.
-    #[error("loop joint '{name}': a {kind} joint has no {what}")]
+    #[error("{}: a {kind} joint has no {what}", titled("loop joint", name))]
     Kind {
         /// Loop joint.
         name: String,
@@ -63,5 +66,15 @@ pub enum LoopJointError {
         kind: &'static str,
         /// The setting.
         what: &'static str,
+    },
+    /// The kind of joint has no such parameter.
+    #[error("{}: a {} joint has no {parameter}; kinds with it: {}", titled("loop joint", name), kind.name(), LoopJointKind::names_with(parameter).join(", "))]
+    Parameter {
+        /// Loop joint.
+        name: String,
+        /// Kind of joint.
+        kind: LoopJointKind,
+        /// Name of the parameter: that of Python.
+        parameter: &'static str,
     },
 }

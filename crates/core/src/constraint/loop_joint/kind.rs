@@ -131,6 +131,32 @@ impl LoopJointKind {
         }
     }
 
+    /// Returns whether joints of this kind have a parameter, by its name in Python's `World.add_joint`. True for those of all kinds.
+    pub fn has(self, parameter: &str) -> bool {
+        use LoopJointKind::*;
+        match parameter {
+            "length" | "second_point" => self.has_length(),
+            "second_axis" => matches!(self, Universal | Planar | Spherical | Gear | Rack),
+            "teeth" => self == Gear,
+            "radius" => self == Rack,
+            "pitch" => self == Screw,
+            "ratio" | "ground" => self == Pulley,
+            "cone" | "twist_limits" => self == Spherical,
+            "angle" => self == Revolute,
+            "limits" => self.dofs() > 0 && self != Spherical,
+            "armature" => self.dofs() > 0 && !self.has_length(),
+            "drive" | "stiffness" | "rest" | "damping" | "friction" | "max_velocity" | "effort" | "dofs" => {
+                self.dofs() > 0
+            }
+            _ => true,
+        }
+    }
+
+    /// Returns the names of the kinds that have a parameter.
+    pub fn names_with(parameter: &str) -> Vec<&'static str> {
+        Self::NAMES.iter().filter(|(_, kind)| kind.has(parameter)).map(|(name, _)| *name).collect()
+    }
+
     /// Returns whether it needs a part on both sides.
     pub fn joins_two_parts(self) -> bool {
         matches!(self, LoopJointKind::Gear | LoopJointKind::Rack | LoopJointKind::Pulley)

@@ -378,6 +378,15 @@ impl LoopJoint {
         }
     }
 
+    /// Sets its name.
+    pub(crate) fn set_name(&mut self, name: &str) {
+        self.name = name.into();
+    }
+
+    fn without(&self, parameter: &'static str) -> LoopJointError {
+        LoopJointError::Parameter { name: self.name.clone(), kind: self.kind, parameter }
+    }
+
     fn wrong_kind(&self, what: &'static str) -> LoopJointError {
         LoopJointError::Kind { name: self.name.clone(), kind: self.kind.name(), what }
     }
@@ -413,6 +422,10 @@ impl Object for LoopJoint {
 
     fn constraint(&self) -> Option<&dyn Constraint> {
         Some(self)
+    }
+
+    fn attached_to(&self, other: ObjectId) -> bool {
+        [&self.a, &self.b].into_iter().any(|side| side.is_on(other))
     }
 
     fn frame_state(&self) -> Option<&dyn FrameState> {

@@ -12,13 +12,16 @@ impl LoopJoint {
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a constant out of its range, and for limits that exclude the length of a pulley that
-    /// follows them.
+    /// follows them; [`LoopJointError::Parameter`] for a constant of another kind that is not the default one.
     pub fn set_transmission(&mut self, transmission: Transmission) -> Result<(), LoopJointError> {
         if let Some((what, value, expected)) = transmission.range_error() {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
         }
         if let (None, Some(limits)) = (self.length, self.dof().limits) {
             self.check_limits(limits, transmission.rope_length())?;
+        }
+        if let Some(parameter) = transmission.foreign_to(self.kind) {
+            return Err(self.without(parameter));
         }
         self.transmission = transmission;
         Ok(())
@@ -131,13 +134,13 @@ impl LoopJoint {
     /// Sets the armature of degree of freedom `k`, kg·m² or kg, at least 0.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for a value out of its range, [`LoopJointError::Kind`] for a joint whose positions are
-    /// lengths, or that has no such degree of freedom.
+    /// [`LoopJointError::Range`] for a value out of its range, [`LoopJointError::Parameter`] for a joint whose positions are
+    /// lengths, [`LoopJointError::Kind`] or [`LoopJointError::NoDof`] without such a degree of freedom.
     pub fn set_armature_at(&mut self, k: usize, armature: f64) -> Result<(), LoopJointError> {
         let fine = armature.is_finite() && (armature == 0.0 || (1e-12..=1e12).contains(&armature));
         self.check("the armature", armature, fine, "0, or from 1e-12 to 1e12")?;
         match k < self.kind.dofs() {
-            _ if self.kind.has_length() && armature != 0.0 => return Err(self.wrong_kind("armature")),
+            _ if self.kind.has_length() && armature != 0.0 => return Err(self.without("armature")),
             false if armature != 0.0 || k > 0 => return Err(self.wrong_dof(k)),
             _ => self.dofs[k].armature = armature,
         }
@@ -148,10 +151,10 @@ impl LoopJoint {
     /// which the z axis of A's stays; `None` for none.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for an angle out of its range, [`LoopJointError::Kind`] for another kind.
+    /// [`LoopJointError::Range`] for an angle out of its range, [`LoopJointError::Parameter`] for another kind.
     pub fn set_cone(&mut self, cone: Option<f64>) -> Result<(), LoopJointError> {
         if self.kind != LoopJointKind::Spherical && cone.is_some() {
-            return Err(self.wrong_kind("cone"));
+            return Err(self.without("cone"));
         }
         let angle = cone.unwrap_or(0.0);
         self.check("the cone", angle, (0.0..=PI).contains(&angle), "0 to π rad; None for none")?;
@@ -164,10 +167,10 @@ impl LoopJoint {
     /// from there.
     ///
     /// # Errors
-    /// [`LoopJointError::Range`] for limits out of their range, [`LoopJointError::Kind`] for another kind.
+    /// [`LoopJointError::Range`] for limits out of their range, [`LoopJointError::Parameter`] for another kind.
     pub fn set_twist_limits(&mut self, limits: Option<[f64; 2]>) -> Result<(), LoopJointError> {
         if self.kind != LoopJointKind::Spherical && limits.is_some() {
-            return Err(self.wrong_kind("twist"));
+            return Err(self.without("twist_limits"));
         }
         if let Some((what, value, expected)) = limits.and_then(twist_fault) {
             return Err(LoopJointError::Range { name: self.name.clone(), what, value, expected });
@@ -180,10 +183,10 @@ impl LoopJoint {
     ///
     /// # Errors
     /// [`LoopJointError::Range`] for a length that is not finite and at least 0, or that the limits exclude,
-    /// [`LoopJointError::Kind`] for a joint without a length.
+    /// [`LoopJointError::Parameter`] for a joint without a length.
     pub fn set_length(&mut self, length: f64) -> Result<(), LoopJointError> {
         if !self.kind.has_length() {
-            return Err(self.wrong_kind("length"));
+            return Err(self.without("length"));
         }
         self.check("the length", length, length.is_finite() && length >= 0.0, "finite and at least 0")?;
         if let Some(limits) = self.dof().limits {

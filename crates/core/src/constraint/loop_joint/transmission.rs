@@ -1,5 +1,6 @@
 //! Constants of joints that transmit motion.
 
+use super::LoopJointKind;
 use tumble_collide::{Pose, Vec3};
 
 /// Constants of gears, racks, screws and pulleys; each kind uses its own.
@@ -39,6 +40,22 @@ impl Transmission {
     pub(super) fn rope_length(&self) -> f64 {
         let [a, b] = [0, 1].map(|k| (self.references[k].translation.vector - self.ground[k]).norm());
         a + self.ratio * b
+    }
+
+    /// Returns the first constant that joints of a kind do not have, and that is not the default one.
+    pub(super) fn foreign_to(&self, kind: LoopJointKind) -> Option<&'static str> {
+        let usual = Transmission::default();
+        let changed = [
+            ("teeth", self.teeth != usual.teeth),
+            ("radius", self.radius != usual.radius),
+            ("pitch", self.pitch != usual.pitch),
+            ("ratio", self.ratio != usual.ratio),
+            ("ground", self.ground != usual.ground),
+        ];
+        changed
+            .into_iter()
+            .find(|(parameter, changed)| *changed && !kind.has(parameter))
+            .map(|(parameter, _)| parameter)
     }
 
     /// Returns the first constant out of its range: name, value, admissible range.

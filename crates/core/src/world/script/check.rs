@@ -10,6 +10,7 @@ use crate::object::has_sensor;
 use crate::rigid::RigidBody;
 use crate::world::World;
 use crate::world::view::{Mode, ObjectId};
+use tumble_collide::Vec3;
 
 /// Why an event cannot be added.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -99,7 +100,14 @@ impl ScriptedEvent {
                 finite("a velocity", velocity.iter().chain(angular_velocity))?;
                 moving(body)?;
                 match body {
-                    Subject::Part(id, _) => of_kind::<RigidBody>(world, *id, "a rigid body"),
+                    Subject::Part(id, _) => {
+                        of_kind::<RigidBody>(world, *id, "a rigid body")?;
+                        let fixed = world.status(*id).is_some_and(|status| status.mode == Mode::Static);
+                        if fixed && (*velocity, *angular_velocity) != (Vec3::zeros(), Vec3::zeros()) {
+                            return Err(kind(world, *id, "dynamic or kinematic; a static body has no velocity"));
+                        }
+                        Ok(())
+                    }
                     Subject::Other => Ok(()),
                 }
             }

@@ -74,7 +74,11 @@ impl World {
                 self.apply_impulse(body, part, *impulse, &at)
             }
             Action::SetVelocity { body, velocity, angular_velocity } => {
-                self.set_velocity(who(body)?.0, *velocity, *angular_velocity)
+                match self.set_velocity(who(body)?.0, *velocity, *angular_velocity) {
+                    // whatever touched may be the ground
+                    Err(WorldError::Static(_)) if *body == Subject::Other => Ok(()),
+                    outcome => outcome,
+                }
             }
             Action::Remove(body) => self.set_enabled(who(body)?.0, false),
             Action::Enable(object) => self.set_enabled(*object, true),

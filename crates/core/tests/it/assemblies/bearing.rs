@@ -108,7 +108,7 @@ fn ratio(count: usize, facets: usize, dt: f64) -> (f64, f64) {
 }
 
 /// The balls go around at the velocity of rolling. In each step they move along their tangents, which takes them along the
-/// cones by a way that falls with the step. More than three balls slip: their velocities differ by up to 0.7 %.
+/// cones by a way that falls with the step.
 #[test]
 fn balls_of_a_bearing_go_around_at_the_velocity_of_rolling_full_length() {
     let exact = 0.5 * (1.0 - BALL / PITCH * ALPHA.cos());
@@ -118,9 +118,15 @@ fn balls_of_a_bearing_go_around_at_the_velocity_of_rolling_full_length() {
         (mean / exact - 1.0).abs()
     });
     println!("errors of the velocity {errors:?}, by theory {exact:.5}");
-    if slow() {
-        ratio(8, 192, DT / 4.0);
-    }
     assert!(errors[0] < 2e-3 && errors[3] < 3e-4, "{errors:?}");
     assert!(errors[1..].windows(2).all(|pair| pair[1] < 0.7 * pair[0]), "{errors:?}");
+}
+
+/// Eight balls share the load in a way that rigid bodies leave open, and some slip: each goes around at the velocity of rolling
+/// to 1 %, and their mean to 0.5 %.
+#[test]
+fn eight_balls_of_a_bearing_go_around_nearly_at_the_velocity_of_rolling() {
+    let exact = 0.5 * (1.0 - BALL / PITCH * ALPHA.cos());
+    let (mean, spread) = ratio(8, 192, DT / 4.0);
+    assert!((mean / exact - 1.0).abs() < 5e-3 && spread < 1e-2 * exact, "{mean} ± {spread} instead of {exact}");
 }

@@ -21,8 +21,9 @@ impl World {
 
 #[pymethods]
 impl World {
-    /// Positions of all bodies, as ``body.position``, in the order of ``bodies``: a copy of shape
-    /// (n, 3), m; for an articulation that of its first link. Setting it moves the rigid bodies whose
+    /// Positions of all bodies, as ``body.position``, in the order of ``bodies``: a read-only copy of shape
+    /// (n, 3), m; for an articulation that of its first link. Setting it, as in
+    /// ``world.positions = world.positions + (0, 0, 1)``, moves the rigid bodies whose
     /// rows change and keeps their velocities; rows of articulations must stay as they are.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Result<Bound<'py, PyArray2<f64>>> {

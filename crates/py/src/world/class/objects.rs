@@ -118,7 +118,8 @@ impl World {
     }
 
     /// Removes an object, given as a handle or by name, or a force, a field or a behavior by name. Handles
-    /// of a removed object raise ``RemovedError``. Joints of a removed body stay, without effect.
+    /// of a removed object raise ``RemovedError``. Joints and measuring sensors of a removed body are removed with it, and
+    /// so are couplings and sensors of a removed joint.
     #[pyo3(signature = (body, **unknown), text_signature = "($self, body)")]
     fn remove(&self, py: Python<'_>, body: &Bound<'_, PyAny>, unknown: Option<Unknown<'_, '_>>) -> Result<()> {
         keywords::check(unknown, "World.remove")?;

@@ -37,13 +37,12 @@ impl World {
         Shot::new([width, height], camera, facet, cave, overlays)?.take(py, &self.shared)
     }
 
-    /// Opens a window on the world and returns it: ``tumble.Window``. A process of its own draws the world as
+    /// Opens a window on the world and returns it once it is open: ``tumble.Window``. A process of its own draws the world as
     /// it stands, 60 times a second, while the program steps and changes it. The window closes with the
     /// program.
     ///
     /// block: step the world in real time until the window is closed. title, width, height (pixels): of the
-    /// window. Without a desktop or a graphics adapter, ``block=True`` and later calls of ``is_open`` raise
-    /// ``PictureError``.
+    /// window. Without a desktop or a graphics adapter it raises ``PictureError`` with the reason.
     #[pyo3(signature = (*, block=false, title=None, width=1280, height=720, **unknown), text_signature = "($self, *, block=False, title=None, width=1280, height=720)")]
     fn view(
         slf: &Bound<'_, Self>,
