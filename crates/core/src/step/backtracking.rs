@@ -31,31 +31,23 @@
 //! ([`Integratable::made_for_step`](crate::Integratable::made_for_step)), such as cloth, the whole frame is time-stepping
 //! sub-steps of that length: it has no motion within one in which an event could be located.
 
-use super::adhesion::adhere;
-use super::budget::IMPACTS;
-use super::contacts::{
-    Limit, build_rows, detect, free_motion_change, gyroscopic, impulses, limits, row_velocities, whiten,
-};
-use super::correction::{self, ActiveLimit, Contacts, Impulses, Limits, Options, Velocities};
-use super::event_location::{Bracket, LimitRole, Role, SLOW, Watch};
-use super::held_forces::{hold_forces, push_to};
-use super::impact::{self, Candidate};
-use super::patch::solve_patches;
+mod advance;
+mod resolve;
+
+use super::contacts::{Limit, build_rows, detect};
+use super::correction::{self, ActiveLimit, Contacts, Limits, Options};
+use super::event_location::{Role, SLOW, Watch};
 use super::slide_end::SlideEnds;
-use super::warm_start::{row_starts, warm_start};
 use super::{StepContext, Stepper, TimeStepping, Workspace, extrapolation};
 use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
-use crate::contact::motion;
 use crate::contact::pair::{PredictionMode, Reach};
 use crate::integrators::Adaptive;
 use crate::object::{Level, RowTarget};
-use crate::sensor::loads::SubstepForces;
 use crate::settings::{Integrator, Settings};
-use crate::solver::SolverSettings;
-use crate::world::{Coordinates, Core, StepError};
+use crate::world::{Core, StepError};
 use nalgebra::ComplexField;
-use tumble_collide::NormalFrom;
+use resolve::Resolved;
 
 /// The stepper of the thesis, `backtracking`.
 #[derive(Default)]
@@ -77,14 +69,6 @@ pub struct Backtracking {
     forces: Vec<f64>,
 }
 
-/// The outcome of a solve for contact forces.
-enum Resolved {
-    /// The generalized contact forces that hold over the sub-step.
-    Forces(Vec<f64>),
-    /// A slide ends after this time, s.
-    SlideEnds(f64),
-}
-
 /// Number of tries in a frame after which the rest of it is one time-stepping sub-step.
 const TRIES: u32 = 200;
 /// Soft forces are implicit rows if any of them changes its own velocity by more than this fraction of
@@ -96,10 +80,6 @@ const FLOOR: f64 = 1.0 / (1 << 28) as f64;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// Maximum number of steps in a frame that an object is made for.
 const MOST_MADE_STEPS: f64 = 10_000.0;
-/// Maximum number of passes of the impact phase.
-const IMPACT_PASSES: u32 = 200;
-/// Maximum number of corrections of a time found by dense output, before the dense state is taken.
-const CORRECTIONS: u32 = 2;
 
 /// Returns the length of the sub-step after one of `h` seconds that covered `went` (0: it is to be taken again) with an error.
 fn next_length(core: &Core, (h, went): (f64, f64), error: f64) -> f64 {
@@ -125,27 +105,6 @@ fn steps_made_for(core: &Core) -> Result<Option<f64>, StepError> {
         shortest = Some(shortest.map_or(step, |other: f64| other.min(step)));
     }
     Ok(shortest)
-}
-
-/// Returns whether a row is a spring, a damper or a drive of finite gain.
-fn is_soft(target: &RowTarget) -> bool {
-    target.compliance > 0.0 && !target.inertial
-}
-
-/// Returns the generalized velocities `h` seconds of free motion after a state. Those of objects whose state holds
-/// velocities are those of the state.
-fn velocities_after(core: &mut Core, x: &[f64], h: f64) -> Vec<f64> {
-    let mut out = vec![0.0; core.dof];
-    let Coordinates { objects, caches, .. } = core.coordinates(None);
-    for entry in objects.iter().filter(|e| e.moves()) {
-        let Some(body) = entry.object.integratable() else { continue };
-        let mut x = x[entry.state_range.x.clone()].to_vec();
-        if !body.holds_velocity() {
-            body.free_motion(&mut caches[entry.place], &mut x, h);
-        }
-        body.velocity(&x, &mut out[entry.state_range.v.clone()]);
-    }
-    out
 }
 
 impl Stepper for Backtracking {
@@ -331,354 +290,9 @@ impl Backtracking {
         self.watch.roles.clear();
         self.watch.roles.extend(self.work.contact_constraints.iter().map(role));
     }
+}
 
-    /// Resolves impacts (thesis `ResolveImpacts`). Returns whether any velocity changed, so that
-    /// other contacts may be near now.
-    fn resolve_impacts(&mut self, core: &mut Core) -> bool {
-        let work = &mut self.work;
-        let s = core.settings;
-        let candidates: Vec<Candidate> = work
-            .contact_constraints
-            .iter()
-            .zip(&self.watch.roles)
-            .map(|(constraint, role)| {
-                let pressing = (-constraint
-                    .acceleration(
-                        &core.derived.part_states[constraint.a as usize],
-                        &core.derived.part_states[constraint.b as usize],
-                    )
-                    .x)
-                    .max(0.0);
-                let rebound =
-                    (2.0 * pressing * if role.lasts { s.drift_tolerance } else { s.contact_tolerance }).sqrt();
-                let rest_speed =
-                    (rebound / constraint.restitution.max(1e-3)).min(pressing * s.dt).max(impact::SLOWEST_BOUNCE);
-                Candidate {
-                    takes_part: role.touching,
-                    stops: false,
-                    rest_speed,
-                    restitution: constraint.restitution,
-                    crowd: false,
-                }
-            })
-            .collect();
-        let (mut u, mut total) = (Vec::new(), vec![0.0; work.rows.len]);
-        whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
-        let before = u.clone();
-        let budget = core.meter.left(IMPACTS);
-        impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
-        let struck = total.iter().any(|l| *l != 0.0);
-        if struck {
-            core.touch_impacts(&work.contact_constraints, impulses(work, &total, 0.0));
-            if core.has_breakable_joints() {
-                core.break_joints(&row_starts(work, &total, 1.0 / core.settings.dt));
-            }
-            if core.collects_loads() {
-                let (forces, rows) = (impulses(work, &total, 0.0).collect(), row_starts(work, &total, 1.0));
-                core.load_impact(&SubstepForces {
-                    constraints: &work.contact_constraints,
-                    forces,
-                    moments: &[],
-                    scale: 1.0,
-                    rows,
-                });
-            }
-            push_to(core, &u, &before);
-        }
-        struck
-    }
-
-    /// Moves the contacts that touch to the middle of the rest of the frame, so that their forces act
-    /// where they do in the mean. They stay if an event is to end the sub-step before, or if two edges
-    /// touch, whose contact cannot be moved with the others.
-    fn move_contacts(&mut self, core: &mut Core, left: f64) -> Result<(), StepError> {
-        let (contacts, roles) = (&mut self.work.contact_constraints, &self.watch.roles);
-        let held = contacts.iter().zip(roles).any(|(c, r)| r.touching && c.contact.normal_from == NormalFrom::Edges);
-        if held || self.watch.first_guess(contacts, &core.derived.part_states, left) < left {
-            return Ok(());
-        }
-        let mut moves = false;
-        for (constraint, _) in contacts.iter_mut().zip(roles).filter(|(_, role)| role.touching) {
-            moves |= motion::move_in_step(core, constraint, 0.5 * left);
-        }
-        if moves { build_rows(core, None, &mut self.work, self.level, 0.5 * left) } else { Ok(()) }
-    }
-
-    /// Resolves contacts (thesis `ResolveContacts`) for a sub-step of `left` seconds.
-    fn resolve_contacts(&mut self, core: &mut Core, left: f64) -> Result<Resolved, StepError> {
-        let mut dp = std::mem::take(&mut self.work.dp);
-        let time = core.state.time;
-        core.integration().evaluate(time, &mut dp);
-        self.move_contacts(core, left)?;
-        let work = &mut self.work;
-        let mut u = Vec::new();
-        whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
-        work.dp = dp;
-        if work.targets.iter().any(correction::is_joint) {
-            self.forces.clone_from(&work.du_force);
-            let free = free_motion_change(core.coordinates(None), 1.0);
-            self.forces.iter_mut().zip(&free).for_each(|(force, free)| *force -= free);
-        }
-        let mut velocity = Vec::new();
-        row_velocities(&core.threads, &work.rows, &work.bias, &u, &mut velocity);
-        let mut acceleration = work.du_force.clone();
-        if let Some(turning) = gyroscopic(core.coordinates(None)) {
-            acceleration.iter_mut().zip(&turning).for_each(|(rate, g)| *rate -= g);
-        }
-        row_velocities(&core.threads, &work.rows, &vec![0.0; work.rows.len], &acceleration, &mut work.c);
-        let mut keep = vec![true; work.rows.blocks.len()];
-        for (i, (constraint, role)) in work.contact_constraints.iter().zip(&self.watch.roles).enumerate() {
-            let range = work.rows.blocks[i].range();
-            let acceleration = constraint.acceleration(
-                &core.derived.part_states[constraint.a as usize],
-                &core.derived.part_states[constraint.b as usize],
-            );
-            for (k, row) in range.clone().enumerate() {
-                let moved = &constraint.moved;
-                let rate = if moved.time > 0.0 {
-                    // the contact is that of the middle of the sub-step, links are at its start
-                    work.c[row] + constraint.frame.axes[k].dot(&(0.5 * moved.rate + moved.of_links + moved.of_driven))
-                } else {
-                    acceleration[k]
-                };
-                work.c[row] = rate + velocity[row] / left;
-            }
-            work.c[range.start] += constraint.contact.gap.max(0.0) / (left * left);
-            keep[i] = role.touching && (role.lasts || velocity[range.start] < 1e-7);
-        }
-        let mut adhesion = vec![0.0; core.dof];
-        adhere(work, core.settings.drift_tolerance, 1.0, &mut adhesion);
-        if adhesion.iter().any(|du| *du != 0.0) {
-            work.rows.add_velocity(&adhesion, &mut work.c);
-        }
-        self.watch_limits(core, &velocity, &mut keep);
-        let work = &mut self.work;
-        let contact_constraints = work.contact_constraints.len();
-        for (i, target) in work.targets.iter().enumerate() {
-            let row = work.rows.blocks[contact_constraints + i].row as usize;
-            if target.inertial {
-                work.c[row] += target.bias_acceleration;
-                continue;
-            }
-            // rows are those of the middle of the step, and turn further in its second half
-            let over = if is_soft(target) { target.share * left } else { left };
-            work.c[row] += 0.5 * target.bias_acceleration + (velocity[row] - target.velocity) / over;
-            if target.set == RowSet::HalfLine {
-                work.c[row] += target.error.max(0.0) / (left * left);
-            }
-        }
-        warm_start(core, work, 1.0);
-        keep.iter().zip(&work.rows.blocks).filter(|(k, _)| !**k).for_each(|(_, b)| work.lambda[b.range()].fill(0.0));
-        let s = core.settings.solver_settings;
-        let solver_settings = SolverSettings {
-            max_sweeps: s.max_sweeps.max(2000),
-            max_relaxations: s.max_relaxations.max(1_000_000),
-            tolerance: s.tolerance / left,
-            budget: core.meter.for_solve(work.rows.blocks.len()),
-        };
-        let rate = |i: usize| acceleration[i] + adhesion[i];
-        let free: Vec<f64> = (0..u.len()).map(|i| u[i] + left * rate(i)).collect();
-        let ray = solve_patches(core, None, work, (solver_settings, left), &keep, &free)?;
-        let floor = core.settings.dt * FLOOR;
-        if let Some(end) = self.slides.before(core, work, &velocity, left)
-            && end > floor
-        {
-            return Ok(Resolved::SlideEnds(end));
-        }
-        work.du.iter_mut().zip(&adhesion).for_each(|(du, pull)| *du += pull);
-        self.held = correction::limits_with_force(work);
-        let mut held = vec![0.0; core.dof];
-        if ray {
-            // no force at the acceleration level keeps the contacts closed; an impulse without
-            // collision does
-            let after: Vec<f64> = u.iter().zip(&work.du).map(|(u, du)| u + left * du).collect();
-            push_to(core, &after, &u);
-        } else {
-            hold_forces(core, work, &mut held);
-        }
-        if core.has_breakable_joints() {
-            core.break_joints(&row_starts(work, &work.lambda, 1.0));
-        }
-        if core.collects_loads() {
-            let (forces, rows) = (impulses(work, &work.lambda, 1.0).collect(), row_starts(work, &work.lambda, 1.0));
-            let (constraints, moments) = (&work.contact_constraints[..], &work.moments[..]);
-            core.load_substep(&SubstepForces { constraints, forces, moments, scale: 1.0, rows });
-        }
-        core.publish(
-            &work.contact_constraints,
-            impulses(work, &work.lambda, 1.0).map(|f| f * left),
-            impulses(work, &work.lambda, 1.0),
-            row_starts(work, &work.lambda, 1.0),
-        );
-        Ok(Resolved::Forces(held))
-    }
-
-    /// Assigns the roles of limits: those with a reported gap are active from the time at which
-    /// they are reached, others over the whole sub-step. `velocity` has the velocities of the rows,
-    /// `work.c` their accelerations.
-    fn watch_limits(&mut self, core: &Core, velocity: &[f64], keep: &mut [bool]) {
-        let (work, contact_constraints, watch) = (&self.work, self.work.contact_constraints.len(), &mut self.watch);
-        watch.limits.clear();
-        let mut located = vec![false; work.targets.len()];
-        for limit in &work.limits {
-            let (mut rate, mut acceleration) = (0.0, 0.0);
-            if let Some(i) = limit.target.map(|i| i as usize) {
-                let row = work.rows.blocks[contact_constraints + i].row as usize;
-                (rate, acceleration) = (velocity[row], work.c[row] + work.targets[i].bias_acceleration);
-            }
-            let role = LimitRole::new(limit, rate, acceleration, &core.settings);
-            if let Some(i) = limit.target.map(|i| i as usize) {
-                (located[i], keep[contact_constraints + i]) = (true, role.acts());
-            }
-            watch.limits.push(role);
-        }
-        watch.guesses.clear();
-        for (target, block) in work
-            .targets
-            .iter()
-            .zip(&work.rows.blocks[contact_constraints..])
-            .zip(&located)
-            .filter_map(|(t, located)| (!located).then_some(t))
-        {
-            let rate = velocity[block.row as usize];
-            if target.set == RowSet::HalfLine && target.error > 0.0 && rate < 0.0 {
-                watch.guesses.push(-target.error / rate);
-            }
-        }
-    }
-
-    /// Integrates to the next event, at most for `left` seconds. Returns the length of the
-    /// sub-step, s.
-    fn advance(&mut self, core: &mut Core, held: &[f64], left: f64) -> Result<f64, StepError> {
-        core.held.copy_from_slice(held);
-        self.adaptive.path.clear();
-        let start = core.state.x.to_vec();
-        let floor = core.settings.dt * FLOOR;
-        let tolerance = core.settings.contact_tolerance;
-        let mut bracket = Bracket::new(self.watch.nearest(&self.work.contact_constraints, tolerance));
-        let mut h = self
-            .watch
-            .first_guess(&self.work.contact_constraints, &core.derived.part_states, left)
-            .clamp(floor.min(left), left);
-        loop {
-            h = self.go_to(core, &start, h)?;
-            let deepest = core.report.max_penetration;
-            let f = self.margin(core, h)?;
-            let landed = f >= -tolerance && (f <= tolerance || !bracket.crossed());
-            let floored = f < -tolerance && h <= floor;
-            let stuck = core.report.tries >= TRIES * core.division;
-            if landed || floored || (stuck && f >= -tolerance) {
-                core.report.floor_hits += floored as u32;
-                if self.adaptive.path.extends_beyond(h) {
-                    h = self.settle(core, h, &bracket, if landed { f } else { f64::NAN })?;
-                }
-                core.clear_contact_forces();
-                self.correct(core, &start, (h, left))?;
-                core.finish_substep(h)?;
-                return Ok(h);
-            }
-            core.report.max_penetration = deepest;
-            if stuck {
-                core.state.x.copy_from_slice(&start);
-                core.clear_contact_forces();
-                core.integration().refresh();
-                return Ok(0.0);
-            }
-            h = bracket.narrow(h, f, f < -tolerance).max(floor.min(left));
-        }
-    }
-
-    /// Corrects joints, and limits that had a force, at the end of a sub-step of `h` seconds;
-    /// `left` is the time until the end of the frame.
-    fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
-        let joined = self.work.targets.iter().any(correction::is_joint);
-        let (mut before, mut after, struck) = (Vec::new(), Vec::new(), vec![false; core.dof]);
-        if joined {
-            let end = core.state.x.to_vec();
-            (before, after) = (velocities_after(core, start, 0.5 * h), velocities_after(core, &end, -0.5 * h));
-        }
-        let options = Options {
-            h,
-            impulses: joined.then_some(Impulses {
-                velocities: Velocities::Generalized([&before, &after]),
-                du_force: (&self.forces, 1.0),
-                scale: h,
-                struck: &struck,
-            }),
-            level: self.level,
-            start,
-            contacts: Contacts::Ignored,
-            limits: Limits::Listed { limits: &self.held, reach: core.settings.drift_tolerance },
-            recovery: core.settings.recovery_speed * left,
-            tolerance: core.settings.contact_tolerance,
-        };
-        correction::correct(core, None, &mut self.work, &mut self.probe, &options)
-    }
-
-    /// Computes the state `h` after `start`: from the dense output if this sub-step has been
-    /// integrated that far, else by the integrator. Returns the time that it covers, s.
-    fn go_to(&mut self, core: &mut Core, start: &[f64], h: f64) -> Result<f64, StepError> {
-        if self.adaptive.path.reaches(h) {
-            self.adaptive.path.write(&mut core.integration(), h);
-            return Ok(h);
-        }
-        core.state.x.copy_from_slice(start);
-        core.integration().refresh();
-        let (time, integrator) = (core.state.time, core.settings.integrator);
-        self.adaptive.set(&core.settings, core.state.inner_step, core.report.inner_steps);
-        let came = core.integration().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
-        if integrator == Integrator::DormandPrince {
-            core.state.inner_step = self.adaptive.step;
-            core.report.inner_steps = self.adaptive.steps;
-        }
-        core.check_finite(&self.work.dp, None)?;
-        Ok(came)
-    }
-
-    /// Replaces the state of the dense output at `h`, whose margin is `f`, by one that is
-    /// integrated from the start of the inner step: it has the full order, and forces and
-    /// accelerations of its own. If it has not landed, because the two differ by more than the
-    /// contact tolerance, the time is corrected; if that does not help (or `f` is NaN), the dense
-    /// state stays. Returns the length of the sub-step, s.
-    fn settle(&mut self, core: &mut Core, h: f64, bracket: &Bracket, f: f64) -> Result<f64, StepError> {
-        let (dense, tolerance, time) = (core.state.x.to_vec(), core.settings.contact_tolerance, core.state.time);
-        let deepest = core.report.max_penetration;
-        let slope = bracket.slope(h, f);
-        let (from, length) = (self.adaptive.path.before(h).0, self.adaptive.path.length(h));
-        let mut at = h;
-        for _ in 0..=CORRECTIONS {
-            if !(at > from && at <= from + length && f.is_finite()) {
-                break;
-            }
-            core.state.x.copy_from_slice(self.adaptive.path.before(h).1);
-            self.adaptive.set(&core.settings, length, core.report.inner_steps);
-            self.adaptive.integrate(&mut core.integration(), time + from, at - from, &mut self.work.dp, false)?;
-            core.report.inner_steps = self.adaptive.steps;
-            core.check_finite(&self.work.dp, None)?;
-            let off = self.margin(core, at)?;
-            if off.abs() <= tolerance {
-                return Ok(at);
-            }
-            core.report.max_penetration = deepest;
-            at -= off / slope;
-        }
-        core.state.x.copy_from_slice(&dense);
-        core.integration().evaluate(time + h, &mut self.work.dp);
-        core.check_finite(&self.work.dp, None)?;
-        Ok(h)
-    }
-
-    /// Returns the margin of the present state, `h` after the start of the sub-step, m. It counts
-    /// as a try.
-    fn margin(&mut self, core: &mut Core, h: f64) -> Result<f64, StepError> {
-        core.report.tries += 1;
-        detect(core, None, Reach::in_time(0.0, PredictionMode::Relative), &mut self.after);
-        limits(&core.view(core.state.time + h), &mut self.limits_after)?;
-        Ok(self.watch.margin(
-            &self.work.contact_constraints,
-            &self.after,
-            &self.limits_after,
-            core.settings.contact_tolerance,
-        ))
-    }
+/// Returns whether a row is a spring, a damper or a drive of finite gain.
+fn is_soft(target: &RowTarget) -> bool {
+    target.compliance > 0.0 && !target.inertial
 }
