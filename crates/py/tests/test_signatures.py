@@ -115,9 +115,18 @@ CHOICES = {
 def add_joint(kind):
     world = tumble.World()
     two = (world.add_rigid(**BALL), world.add_rigid(tumble.Sphere(1), mass=1))
-    world.add_joint(
-        kind, *two, point=(0, 0, 0), second_point=(0, 0, 1), second_axis=(1, 0, 0), teeth=(1, 2), radius=1, pitch=1, ground=np.eye(3)[:2]
-    )
+    ends = {"second_point": (0, 0, 1)}
+    needed = {
+        "universal": {"second_axis": (1, 0, 0)},
+        "distance": ends,
+        "rope": ends,
+        "spring": ends,
+        "gear": {"teeth": (1, 2)},
+        "rack": {"second_axis": (1, 0, 0), "radius": 1},
+        "screw": {"pitch": 1},
+        "pulley": {**ends, "ground": np.eye(3)[:2]},
+    }
+    world.add_joint(kind, *two, point=(0, 0, 0), **needed.get(kind, {}))
 
 
 def cube():

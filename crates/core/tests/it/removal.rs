@@ -1,4 +1,4 @@
-//! What goes with an object that is removed.
+//! Joints and sensors go with an object that is removed.
 
 use crate::common::*;
 use tumble_core::collide::{Pose, Vec3};

@@ -364,6 +364,10 @@ const OF_SOME_KINDS: [(&str, &str); 30] = [
 fn refuse_foreign(f: &mut Fields<'_>, kind: LoopJointKind) {
     for (key, parameter) in OF_SOME_KINDS.into_iter().filter(|(_, parameter)| !kind.has(parameter)) {
         let Some(value) = f.unread(key) else { continue };
+        if (kind, parameter) == (LoopJointKind::Spherical, "limits") {
+            f.wrong(key, value, "`cone_rad` and `twist_limits_rad`: a spherical joint has these instead");
+            continue;
+        }
         let types = LoopJointKind::names_with(parameter).join(", ");
         f.wrong(key, value, format!("no `{key}` of type \"{}\"; types with it: {types}", kind.name()));
     }
