@@ -6,11 +6,13 @@
 //! above the margin, the search ends; otherwise it is the next sample. On flat faces a few samples
 //! are exact.
 //!
-//! For other bodies a long edge is first divided into parts (`line_parts.rs`): those over faces and
-//! valleys need no search, those over a ridge are one piece. The others are halved into short
-//! pieces, and pieces too far away are dropped (`d_B` changes by at most 1 m per meter). Within a
-//! piece the function is treated as convex until a sample lies below the tangent of another one.
-//! Then B has a valley between them, perhaps with a second minimum, so that part is halved a few
+//! For other bodies an edge is not searched if bounds at a few places show that it is out of reach
+//! (each excludes as much of the edge as it exceeds the margin). A long edge is first divided into
+//! parts (`line_parts.rs`): those over faces and valleys need no search, those over a ridge are one
+//! piece. The others are halved into short pieces, and pieces too far away are dropped (`d_B`
+//! changes by at most 1 m per meter). Within a piece the function is treated as convex until a
+//! sample lies below the tangent of another one. Then B has a valley between them, perhaps with a
+//! second minimum, so that part is halved a few
 //! times.
 //!
 //! If an edge or a corner of B is closest, the minimum of the distance from it has a closed form
