@@ -12,8 +12,7 @@
 //! piece. The others are halved into short pieces, and pieces too far away are dropped (`d_B`
 //! changes by at most 1 m per meter). Within a piece the function is treated as convex until a
 //! sample lies below the tangent of another one. Then B has a valley between them, perhaps with a
-//! second minimum, so that part is halved a few
-//! times.
+//! second minimum, so that part is halved a few times.
 //!
 //! If an edge or a corner of B is closest, the minimum of the distance from it has a closed form
 //! ([`Hyperbola`]). That place is sampled next. If the same edge or corner is closest there, it is
