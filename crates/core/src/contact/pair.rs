@@ -6,13 +6,14 @@
 //! many vertices are not queried with the wide margin that fast bodies need; they are followed
 //! along free motion instead.
 //!
-//! The contacts of two such meshes are also kept from the end of a frame to the start of the next. They are a function of
+//! The contacts of two meshes are also kept from the end of a frame to the start of the next. They are a function of
 //! shapes, poses and margin, and are kept for the same bits of all three, so results do not depend on what is kept. Their
-//! margin is rounded up to a quarter of a power of two (`⌈m⌉` below), so that the margin at the end of a frame is nearly
-//! always that of the start, although forces differ a little:
+//! margin is rounded up to a quarter or a sixteenth of a power of two (`⌈m⌉₄` and `⌈m⌉₁₆` below), so that the margin at the
+//! end of a frame is nearly always that of the start, although forces differ a little:
 //!
 //! ```text
-//! margin = ⌈min(closing, near + 0.05·R)⌉        R: bounding radius of the smaller mesh
+//! margin = ⌈min(closing, near + 0.05·R)⌉₄       R: bounding radius of the smaller mesh
+//! margin = ⌈closing⌉₁₆                          if a mesh has few vertices
 //! ```
 
 use crate::contact::separation::{OrientedBox, are_separated};
@@ -151,16 +152,16 @@ impl PairQuery<'_> {
         let margin = match (self.parts.mode, self.parts.shapes.map(|shape| shape.has_tree())) {
             // two trees within a wide margin have contacts by the million, so the margin is bounded
             (ContactMode::Spheres, [true, true]) => closing.min(self.near + TREE_MARGIN * size),
-            _ if self.is_of_meshes() => rounded_up(closing.min(self.near + MESH_MARGIN * size)),
+            _ if self.is_of_meshes() && self.has_simple_mesh() => rounded_up(closing, 4),
+            _ if self.is_of_meshes() => rounded_up(closing.min(self.near + MESH_MARGIN * size), 2),
             _ => closing,
         };
         (margin, closing)
     }
 
-    /// Returns whether both shapes have meshes of many corners, whose margin is bounded in the `surface` mode.
+    /// Returns whether both shapes have meshes, in the `surface` mode.
     fn is_of_meshes(&self) -> bool {
-        let have_trees = self.parts.shapes.iter().all(|shape| shape.has_tree());
-        self.parts.mode == ContactMode::Surface && have_trees && !self.has_simple_mesh()
+        self.parts.mode == ContactMode::Surface && self.parts.shapes.iter().all(|shape| shape.has_tree())
     }
 
     /// Returns the shapes if the contacts are a function of shapes, poses and margin that is worth keeping.
@@ -196,13 +197,17 @@ impl PairQuery<'_> {
             self.parts.contacts_at(&poses, margin, found);
             return 0.0;
         }
-        let kept = known.look_up(self, rows, &poses, margin, found);
-        if kept.is_none() {
-            self.parts.contacts_at(&poses, margin, found);
+        match known.look_up(self, rows, &poses, margin) {
+            Some((query, contacts)) => {
+                found.extend(contacts.iter().filter(|contact| contact.gap <= margin));
+                // with its own margin, which a later query can need
+                cached.store(query.clone(), contacts);
+            }
+            None => {
+                self.parts.contacts_at(&poses, margin, found);
+                cached.store(CachedQuery { rows, shapes: self.kept_shapes(), poses, margin, end: 0 }, found);
+            }
         }
-        // the contacts of a wider margin within this one are not exactly those of this one
-        let shapes = if kept.is_none_or(|wider| wider == margin) { self.kept_shapes() } else { None };
-        cached.store(CachedQuery { rows, shapes, poses, margin, end: 0 }, found);
         if !found.is_empty() || self.parts.mode == ContactMode::Spheres || margin >= closing {
             return 0.0;
         }
@@ -222,10 +227,10 @@ impl PairQuery<'_> {
     }
 }
 
-/// Returns the next number of the form `k/4·2^n` with `4 ≤ k < 8`, for a positive number.
-fn rounded_up(x: f64) -> f64 {
-    const BELOW: u64 = (1 << 50) - 1;
-    f64::from_bits((x.to_bits() + BELOW) & !BELOW)
+/// Returns the next number with `bits` binary digits after the first one, for a positive number.
+fn rounded_up(x: f64, bits: u32) -> f64 {
+    let below = (1 << (f64::MANTISSA_DIGITS - 1 - bits)) - 1;
+    f64::from_bits((x.to_bits() + below) & !below)
 }
 
 /// Results of the expensive queries of the last detection.
@@ -251,6 +256,7 @@ pub(crate) struct CachedContacts {
     contacts: Vec<Contact>,
 }
 
+#[derive(Clone)]
 struct CachedQuery {
     rows: [u32; 2],
     /// The shapes, if the contacts are exactly those of the shapes at the poses within the margin, and are kept for the next
@@ -311,17 +317,16 @@ impl NarrowPhaseCache {
     }
 }
 
-impl KnownContacts<'_> {
-    /// Writes the cached contacts of a pair to `found`, if neither part has moved and the margin was at least as large; in
-    /// another frame, if everything that they depend on has the same bits. Returns that margin if it did.
+impl<'a> KnownContacts<'a> {
+    /// Returns the last query of a pair and its contacts, if neither part has moved and the margin was at least as large; in
+    /// another frame, if everything that they depend on has the same bits.
     fn look_up(
         &mut self,
         pair: &PairQuery,
         rows: [u32; 2],
         poses: &[Pose; 2],
         margin: f64,
-        found: &mut Vec<Contact>,
-    ) -> Option<f64> {
+    ) -> Option<(&'a CachedQuery, &'a [Contact])> {
         let queries = &self.last.queries;
         while queries.get(self.place).is_some_and(|k| k.rows < rows) {
             self.place += 1;
@@ -332,8 +337,7 @@ impl KnownContacts<'_> {
         };
         let known = queries.get(self.place).filter(is_known)?;
         let start = self.place.checked_sub(1).map_or(0, |before| queries[before].end);
-        found.extend(self.last.contacts[start..known.end].iter().filter(|contact| contact.gap <= margin));
-        Some(known.margin)
+        Some((known, &self.last.contacts[start..known.end]))
     }
 }
 

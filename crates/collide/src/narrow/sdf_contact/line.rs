@@ -6,12 +6,13 @@
 //! above the margin, the search ends; otherwise it is the next sample. On flat faces a few samples
 //! are exact.
 //!
-//! For other bodies a long edge is first divided into parts (`line_parts.rs`): those over faces and
-//! valleys need no search, those over a ridge are one piece. The others are halved into short
-//! pieces, and pieces too far away are dropped (`d_B` changes by at most 1 m per meter). Within a
-//! piece the function is treated as convex until a sample lies below the tangent of another one.
-//! Then B has a valley between them, perhaps with a second minimum, so that part is halved a few
-//! times.
+//! For other bodies an edge is not searched if bounds at a few places show that it is out of reach
+//! (each excludes as much of the edge as it exceeds the margin). A long edge is first divided into
+//! parts (`line_parts.rs`): those over faces and valleys need no search, those over a ridge are one
+//! piece. The others are halved into short pieces, and pieces too far away are dropped (`d_B`
+//! changes by at most 1 m per meter). Within a piece the function is treated as convex until a
+//! sample lies below the tangent of another one. Then B has a valley between them, perhaps with a
+//! second minimum, so that part is halved a few times.
 //!
 //! If an edge or a corner of B is closest, the minimum of the distance from it has a closed form
 //! ([`Hyperbola`]). That place is sampled next. If the same edge or corner is closest there, it is
@@ -37,6 +38,8 @@ use nalgebra::RealField;
 /// Maximum length of a piece if both faces of the edge belong to a smooth surface, in the same
 /// unit; its ends suffice.
 const MAX_SMOOTH_PIECE: f64 = 0.06;
+/// Number of times that what bounds leave of a line is halved, to show that it is out of reach.
+const MAX_CLEARED: u32 = 2;
 /// Maximum number of samples for the end of a flat part.
 const MAX_END_SAMPLES: usize = 20;
 /// Maximum number of samples for a minimum; a third of them are bisections.
@@ -82,6 +85,11 @@ impl Sample {
         }
     }
 
+    /// Returns whether nothing between here and another place is within the limit: the distance changes by at most 1 m per meter.
+    fn is_clear(&self, line: &Line, s: f64, found: &Collector) -> bool {
+        self.hit.nearest - (s - self.s).abs() - line.radius > found.limit()
+    }
+
     /// Returns the tangent at another place.
     fn height(&self, s: f64) -> f64 {
         self.hit.distance + self.slope * (s - self.s)
@@ -109,7 +117,8 @@ impl Query<'_> {
         }
         let [start, end] = ends.map(|p| self.to_field(&p));
         let (middle, length) = (0.5 * (start + end), (end - start).norm());
-        if length <= 0.0 || self.field.bound(&middle) - 0.5 * length - radius > found.limit() {
+        let clear = self.field.bound(&middle) - radius - found.limit();
+        if length <= 0.0 || clear > 0.5 * length {
             return;
         }
         let normals: Normals = normals.iter().map(|n| self.rotation * n).collect();
@@ -123,9 +132,27 @@ impl Query<'_> {
             if start.slope < FLAT_SLOPE && least <= found.limit() {
                 self.search(&line, start, self.sample(&line, length), found);
             }
-        } else {
+        } else if clear <= 0.0
+            || !self.is_clear(&line, (0.0, 0.5 * length - clear), MAX_CLEARED, found)
+            || !self.is_clear(&line, (0.5 * length + clear, length), MAX_CLEARED, found)
+        {
             self.by_parts(&line, found);
         }
+    }
+
+    /// Returns whether bounds of the distance at the middle of a range of a line, and `times` more in what is left of it on
+    /// either side, show that none of it is within the limit.
+    fn is_clear(&self, line: &Line, (from, to): (f64, f64), times: u32, found: &Collector) -> bool {
+        if from >= to {
+            return true;
+        }
+        let middle = 0.5 * (from + to);
+        let clear = self.field.bound(&line.at(middle)) - line.radius - found.limit();
+        clear > 0.0
+            && (clear >= middle - from
+                || (times > 0
+                    && self.is_clear(line, (from, middle - clear), times - 1, found)
+                    && self.is_clear(line, (middle + clear, to), times - 1, found)))
     }
 
     /// Searches a line whose distance is not convex: a long edge by the parts on which it is.
@@ -151,6 +178,9 @@ impl Query<'_> {
         found: &mut Collector,
     ) -> [Option<Sample>; 2] {
         let (from, to) = (low.0, high.0);
+        if low.1.is_some_and(|low| low.is_clear(line, to, found)) {
+            return [low.1, None];
+        }
         let smooth = line.edge.is_some_and(|edge| edge.end_tolerance > 0.0);
         if !self.is_one_piece(to - from, smooth) && to - from > 1e-3 * line.length {
             let middle = 0.5 * (from + to);
@@ -179,7 +209,7 @@ impl Query<'_> {
     ) -> [Option<Sample>; 2] {
         // the minimum of a piece that rises steeply from either end is at that end
         let start = low.1.unwrap_or_else(|| self.sample(line, low.0));
-        if start.slope >= FLAT_SLOPE && high.1.is_none() {
+        if high.1.is_none() && (start.slope >= FLAT_SLOPE || start.is_clear(line, high.0, found)) {
             return [Some(start), None];
         }
         let end = high.1.unwrap_or_else(|| self.sample(line, high.0));

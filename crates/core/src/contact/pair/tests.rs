@@ -125,5 +125,6 @@ fn contacts_of_pairs_that_did_not_move_are_cached() {
     let again = query(1e-3, &mut narrow_phase_cache);
     assert!(again.len() == first.len() && again.iter().all(|c| c.core_b == 42.0), "queried again: {again:?}");
     assert!(query(1e-5, &mut narrow_phase_cache).is_empty(), "further away than the margin");
+    assert_eq!(query(1e-3, &mut narrow_phase_cache), again, "a narrower query has dropped what the wider one found");
     assert_eq!(query(2e-3, &mut narrow_phase_cache), first, "a wider query is a new one");
 }
