@@ -111,7 +111,8 @@ fn change(world: &mut World, kind: u32, pick: usize, kept: &mut WorldState) {
             _ = world.add_force("pull", pull);
         }
         12 => _ = world.find("pull").map(|pull| world.remove(pull)),
-        13 if is_body => world.set_velocity(id, Vec3::new(1.0, 0.0, 0.0), Vec3::zeros()).unwrap(),
+        // a static body has none
+        13 if is_body => _ = world.set_velocity(id, Vec3::new(1.0, 0.0, 0.0), Vec3::zeros()),
         14 if is_body => _ = world.set_mass(id, 0.5 + pick as f64),
         15 => _ = world.apply_force(id, 0, 1e306 * up, &Vec3::zeros()),
         16 => {
