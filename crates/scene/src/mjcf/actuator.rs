@@ -106,6 +106,9 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, controls: Option<&[f64]>, assembly: &
         if !spec.driven && spec.control != 0.0 && spec.gain != 0.0 {
             reader.notes.add(element, "the control of a motor at the start is left out");
         }
+        if !spec.driven && spec.bias[0] != 0.0 {
+            reader.notes.add(element, "the constant force of an actuator without stiffness and damping is left out");
+        }
     }
 }
 

@@ -94,7 +94,10 @@ impl Assembly<'_, '_> {
         let spec = self.body_spec(name, Mode::Kinematic, shape, &self.poses[body], first);
         let collidable = self.groups.collides(first);
         self.statics[body] = (0..self.bodies[body].geoms.len()).map(|k| (k, self.scene.bodies.len())).collect();
-        self.scene.bodies.push(BodySpec { collidable, shape_name, ..spec });
+        let given = Some(self.masses[body]).filter(|m| m.mass > 0.0 && self.bodies[body].inertial.is_some());
+        let (mass, center_m) = (given.map(|m| MassSpec::Mass(m.mass)), given.map(|m| m.center.into()));
+        let inertia_kg_m2 = given.map(|m| m.inertia);
+        self.scene.bodies.push(BodySpec { collidable, shape_name, mass, center_m, inertia_kg_m2, ..spec });
     }
 
     /// Adds a free body as a rigid body. Returns whether that can express it.
@@ -146,7 +149,7 @@ impl Assembly<'_, '_> {
             orientation_xyzw: [q.x, q.y, q.z, q.w],
             velocity_m_per_s: [0.0; 3],
             angular_velocity_rad_per_s: [0.0; 3],
-            material: None,
+            material: surface.material,
             contact: surface.contact,
             contacts: surface.contacts,
             center_m: None,

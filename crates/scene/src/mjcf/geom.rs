@@ -134,6 +134,11 @@ impl<'a> Geom<'a> {
         self.bits != [0; 2]
     }
 
+    /// Returns whether the file gives it a mass or a density other than 0.
+    pub(super) fn is_heavy(&self) -> bool {
+        self.mass.unwrap_or(self.density) != 0.0
+    }
+
     /// Returns the mass of the geom in the frame of its body; none for planes and height fields.
     ///
     /// # Errors

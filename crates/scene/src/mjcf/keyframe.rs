@@ -32,6 +32,7 @@ pub(super) fn apply(root: &XmlNode<'_>, assembly: &mut Assembly<'_, '_>) -> Opti
     let Some(key) = keys.iter().find(|key| key.text("name") == Some(chosen)).or_else(by_number) else {
         let names: Vec<&str> = keys.iter().filter_map(|key| key.text("name")).take(12).collect();
         let expected = match names.is_empty() {
+            true if keys.is_empty() => "expected none: the model has no keyframes".to_owned(),
             true => format!("expected a number below {}, that of the keyframes without names", keys.len()),
             false => format!("expected one of {}", names.join(", ")),
         };

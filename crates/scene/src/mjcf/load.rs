@@ -13,6 +13,7 @@ use crate::build::shapes::{Purpose, ShapeMaker};
 use crate::notes::Notes;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::file::SceneFile;
+use crate::parse::pair::PairSideSpec;
 
 /// Reads a model of MuJoCo as a scene. [`SceneFile::notes`] says what is left out, each with file,
 /// line and element.
@@ -78,13 +79,19 @@ pub(crate) fn one_body(path: &Path, options: &MjcfOptions) -> Result<(Articulate
         let names = scene.articulated.iter().map(|spec| spec.name.clone()).collect();
         return Err(MjcfError::Bodies { file: path.to_path_buf(), count: scene.articulated.len(), names });
     }
-    let spec = scene.articulated.remove(0);
+    let mut spec = scene.articulated.remove(0);
+    // the material of geoms without friction is one of the model, not of the scene that takes the body
+    let shapes = spec.links.iter_mut().flat_map(|link| &mut link.shapes);
+    for surface in shapes.map(|shape| &mut shape.surface).filter(|surface| surface.material.is_some()) {
+        surface.material = None;
+        surface.contact.friction = 0.0;
+    }
     let mut notes = std::mem::take(&mut scene.notes);
     let others = [
         (scene.bodies.len(), "static and rigid bodies"),
         (scene.loop_joints.len(), "loop joints"),
         (scene.mimics.len(), "couplings of joints"),
-        (scene.pairs.len(), "pairs"),
+        (scene.pairs.iter().filter(|pair| !matches!(pair.sides[0], PairSideSpec::Material(_))).count(), "pairs"),
     ];
     for (count, what) in others.into_iter().filter(|(count, _)| *count > 0) {
         notes.push(format!(

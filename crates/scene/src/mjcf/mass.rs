@@ -34,7 +34,7 @@ fn of_geoms(body: &Body<'_>, reader: &Reader<'_>) -> LinkMass {
     let mut sum = LinkMass::none();
     for geom in body.geoms.iter().filter(|geom| (low..=high).contains(&geom.group)) {
         // A geom without mass needs no volume.
-        if geom.mass == Some(0.0) || geom.mass.is_none() && geom.density == 0.0 {
+        if !geom.is_heavy() {
             continue;
         }
         match geom.link_mass(reader) {

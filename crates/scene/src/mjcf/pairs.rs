@@ -1,15 +1,24 @@
 //! `<contact>`: pairs with a friction of their own, and pairs that do not collide.
 
-use super::names::find;
+use tumble_core::Material;
+
+use super::Reader;
+use super::defaults::Item;
+use super::geom::Geom;
+use super::names::{Names, find};
 use super::scene::{Assembly, Place};
 use super::schema;
+use super::shapes::{Partners, do_bits_meet};
 use super::source::XmlNode;
+use super::tree::Body;
 use crate::parse::bound::Bound;
 use crate::parse::pair::{PairSideSpec, PairSpec};
 use crate::xml::Element;
 
 /// Largest number of pairs of a scene.
 const MAX_PAIRS: usize = 100_000;
+/// Friction of a pair that gives fewer numbers: two sliding, one torsional (m), two rolling (m).
+const PAIR_FRICTION: [f64; 5] = [1.0, 1.0, 0.005, 0.0001, 0.0001];
 
 /// Reads all pairs and exclusions.
 pub(super) fn read<'a>(root: &XmlNode<'a>, assembly: &mut Assembly<'_, 'a>) {
@@ -60,9 +69,11 @@ fn pair(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
     let item = assembly.reader.classes.item(*element, 0);
     let [a, b] = ["geom1", "geom2"].map(|side| find(element, side, &assembly.names.geoms, false));
     let (Some(a), Some(b)) = (a, b) else { return };
-    let condim = item.number("condim", Bound::ANY, 3.0);
-    let own = item.list("friction", 5).map(|friction| friction[0].clamp(0.0, 100.0));
-    let friction = if condim <= 1.0 { Some(0.0) } else { own };
+    if a.0 == b.0 || are_joined(a.0, b.0, assembly) {
+        let note = "a pair of geoms of one body, or of bodies that a joint connects, is left out: they never collide";
+        return assembly.reader.notes.add(element, note);
+    }
+    let friction = read_friction(&item, [a, b].map(|(body, geom)| &assembly.bodies[body].geoms[geom]), assembly);
     let sides = [a, b].map(|(body, geom)| match assembly.places[body] {
         Place::World => {
             let found = assembly.statics[body].iter().find(|(k, _)| *k == geom);
@@ -81,6 +92,71 @@ fn pair(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
     };
     // Groups decide whether the other geoms of the two bodies collide; a pair always does.
     add(element, assembly, [a, b], friction, true);
+}
+
+/// Returns the sliding friction of a pair; `None` if that of its geoms holds.
+fn read_friction(item: &Item<'_>, geoms: [&Geom<'_>; 2], assembly: &Assembly<'_, '_>) -> Option<f64> {
+    let notes = &assembly.reader.notes;
+    let condim = item.number("condim", Bound::ANY, 3.0);
+    let given = item.list("friction", 5).map(|list| list.into_iter().map(|x| x.clamp(0.0, 100.0)).collect::<Vec<_>>());
+    let larger = |k: usize| geoms[0].friction[k].max(geoms[1].friction[k]);
+    // two sliding, one torsional, two rolling
+    let wanted = |k: usize, of_geoms: usize| {
+        let own = given.as_ref().and_then(|list| list.get(k)).copied();
+        own.unwrap_or_else(|| if given.is_some() { PAIR_FRICTION[k] } else { larger(of_geoms) })
+    };
+    if condim > 1.0 && given.as_ref().is_some_and(|list| list.get(1).is_some_and(|second| *second != list[0])) {
+        notes.add(item.own(), "the second sliding friction of a pair is left out: the first holds in all directions");
+    }
+    let surfaces = geoms.map(|geom| assembly.groups.surface(geom).contact);
+    let torsional = if condim > 3.0 { wanted(2, 1) } else { 0.0 };
+    let rolling = if condim > 4.0 { [wanted(3, 2), wanted(4, 2)] } else { [0.0; 2] };
+    let held = |of: fn(&Material) -> f64| of(&surfaces[0]).max(of(&surfaces[1]));
+    if torsional != held(|m| m.torsional_friction) || rolling != [held(|m| m.rolling_friction); 2] {
+        notes.add(item.own(), "torsional and rolling friction of a pair are left out: those of its geoms hold");
+    }
+    match condim {
+        _ if condim <= 1.0 => Some(0.0),
+        _ if geoms.iter().all(|geom| geom.dimensions <= 1.0) => Some(wanted(0, 0)),
+        _ => given.map(|list| list[0]),
+    }
+}
+
+/// Returns whether two bodies move as one, or one of them is on the other by a joint.
+fn are_joined(a: usize, b: usize, assembly: &Assembly<'_, '_>) -> bool {
+    let bodies = assembly.bodies;
+    // the body that moves, of those that are fixed to each other
+    let carrier = |mut body: usize| {
+        while body != 0 && bodies[body].joints.is_empty() {
+            body = bodies[body].parent;
+        }
+        body
+    };
+    let (a, b) = (carrier(a), carrier(b));
+    let on = |upper: usize, lower: usize| lower != 0 && upper != 0 && carrier(bodies[upper].parent) == lower;
+    a == b || on(a, b) || on(b, a)
+}
+
+/// Returns the geoms that collide by a pair alone, since `contype` and `conaffinity` keep them apart.
+pub(super) fn partners(root: &XmlNode<'_>, bodies: &[Body<'_>], names: &Names, reader: &Reader<'_>) -> Partners {
+    let mut partners = Partners::new();
+    if !reader.contacts {
+        return partners;
+    }
+    for pair in root.all("contact").flat_map(|section| section.all("pair")) {
+        let [a, b] = ["geom1", "geom2"].map(|side| {
+            let name = pair.element.text(side)?;
+            let (body, geom) = *names.geoms.get(name)?;
+            Some((name, body, bodies[body].geoms[geom].bits))
+        });
+        let (Some((first, a, bits)), Some((second, b, others))) = (a, b) else { continue };
+        if a != b && !do_bits_meet(bits, others) {
+            for [name, other] in [[first, second], [second, first]] {
+                partners.entry(name.to_owned()).or_default().insert(other.to_owned());
+            }
+        }
+    }
+    partners
 }
 
 fn add(

@@ -1,11 +1,12 @@
 //! Puts the bodies of a model together as a scene.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::Pose;
 
+use super::geom::Form;
 use super::joint::Kind;
 use super::names::{Names, Taken, joint_ends};
 use super::shapes::{Groups, Meshes};
@@ -57,7 +58,7 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, path: &Path, reader: &Reader<'a>, log
     note_sections(root, reader);
     let bodies = tree::read(root, reader);
     let names = Names::of(&bodies);
-    let groups = Groups::of(&bodies);
+    let groups = Groups::of(&bodies, pairs::partners(root, &bodies, &names, reader), &root.element, reader);
     let mut scene = SceneFile::parse("", &path.display().to_string()).ok()?;
     read_option(root, reader, &mut scene);
     // Numbers that are not finite are problems, and masses need finite numbers.
@@ -94,6 +95,10 @@ pub(super) fn read<'a>(root: &XmlNode<'a>, path: &Path, reader: &Reader<'a>, log
     actuator::read(root, controls.as_deref(), &mut assembly);
     sensor::read(root, &mut assembly);
     pairs::read(root, &mut assembly);
+    if let Some((material, pair)) = assembly.groups.frictionless() {
+        assembly.scene.materials.push(material);
+        assembly.scene.pairs.push(pair);
+    }
     views::read(&mut assembly);
     let mut scene = assembly.scene;
     scene.meshes = assembly.meshes.specs;
@@ -165,19 +170,40 @@ impl Assembly<'_, '_> {
     /// Checks that every joint moves some mass or has an armature.
     fn check_masses(&self) {
         let mut heavy: Vec<bool> = self.masses.iter().map(|m| m.mass > 0.0 || m.inertia.amax() > 0.0).collect();
+        // meshes that add no mass, of each body and those below it
+        let mut faults: Vec<BTreeMap<&str, String>> = self.bodies.iter().map(|body| self.faults(body)).collect();
         for (number, body) in self.bodies.iter().enumerate().skip(1).rev() {
             let massless = |joint: &&super::joint::JointItem<'_>| joint.armature == 0.0;
             if !heavy[number] && body.joints.iter().any(|joint| massless(&joint)) {
                 let message = "moves no mass: it and its descendants have none";
-                body.element.problem(message, "expected <inertial>, or a geom with a mass, in one of them");
+                if faults[number].is_empty() {
+                    body.element.problem(message, "expected <inertial>, or a geom with a mass, in one of them");
+                }
+                for (mesh, why) in std::mem::take(&mut faults[number]) {
+                    let expected = "expected an existing mesh with a volume, or <inertial> in the body";
+                    let element = &self.reader.assets.meshes[mesh].element;
+                    element.problem(format!("has no mass, so a body moves none: {why}"), expected);
+                }
                 // One message for the chain is enough.
                 heavy[number] = true;
             }
             // A free body needs mass of its own or below it; a chain passes it on.
             if body.parent > 0 {
                 heavy[body.parent] |= heavy[number];
+                let own = std::mem::take(&mut faults[number]);
+                faults[body.parent].extend(own);
             }
         }
+    }
+
+    /// Returns the meshes of a body that should add mass and do not, and why.
+    fn faults(&self, body: &Body<'_>) -> BTreeMap<&str, String> {
+        let meshes = body.geoms.iter().filter(|geom| geom.is_heavy());
+        let named = meshes.filter_map(|geom| match &geom.form {
+            Form::Mesh(name) => Some(self.reader.assets.meshes.get_key_value(name)?.0.as_str()),
+            _ => None,
+        });
+        named.filter_map(|name| Some((name, self.reader.mesh_mass(name).err()?))).collect()
     }
 
     /// Returns whether a site is the place of a joint of `<equality>`, and nothing else.

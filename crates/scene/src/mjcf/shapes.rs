@@ -1,6 +1,6 @@
 //! Geoms as shapes of bodies and links, and their collision groups.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use tumble_core::collide::{Pose, TriMesh, Vec3};
@@ -10,46 +10,118 @@ use super::Reader;
 use super::asset::MeshFrom;
 use super::geom::{Form, Geom};
 use super::tree::Body;
+use crate::parse::appearance::AppearanceSpec;
 use crate::parse::link::{Geometry, LinkShape, Surface};
+use crate::parse::material::MaterialSpec;
 use crate::parse::mesh::{MeshSource, MeshSpec};
+use crate::parse::pair::{PairSideSpec, PairSpec};
 use crate::parse::shape::ShapeSpec;
 use crate::urdf::MissingMeshes;
+use crate::xml::Element;
 
 /// Number of collision groups.
 const GROUPS: usize = 64;
 
-/// Collision groups for the combinations of `contype` and `conaffinity` of a model.
+/// Names of the geoms that each geom meets by a `<pair>` alone, by its name.
+pub(super) type Partners = BTreeMap<String, BTreeSet<String>>;
+
+/// Index of the material of geoms with `condim="1"` in [`SceneFile::materials`](crate::SceneFile::materials).
+const FRICTIONLESS: usize = 0;
+
+/// Geoms that collide with the same others.
+struct Kind {
+    bits: [u32; 2],
+    /// Names of the geoms that these meet by a `<pair>` alone.
+    partners: BTreeSet<String>,
+    /// Name of one of these geoms.
+    name: Option<String>,
+}
+
+impl Kind {
+    fn meets(&self, other: &Kind) -> bool {
+        let paired = other.name.as_ref().is_some_and(|name| self.partners.contains(name));
+        paired || do_bits_meet(self.bits, other.bits)
+    }
+}
+
+/// Returns whether geoms with these `contype` and `conaffinity` collide.
+pub(super) fn do_bits_meet(a: [u32; 2], b: [u32; 2]) -> bool {
+    a[0] & b[1] != 0 || b[0] & a[1] != 0
+}
+
+/// Collision groups for the combinations of `contype`, `conaffinity` and pairs of a model.
 pub(super) struct Groups {
-    kinds: Vec<[u32; 2]>,
+    kinds: Vec<Kind>,
+    partners: Partners,
+    /// Whether there are geoms with `condim="1"` and a friction, and others.
+    mixed: bool,
 }
 
 impl Groups {
-    pub(super) fn of(bodies: &[Body<'_>]) -> Groups {
-        let mut groups = Groups { kinds: Vec::new() };
-        for geom in bodies.iter().flat_map(|body| &body.geoms).filter(|geom| geom.collides()) {
-            if groups.kinds.contains(&geom.bits) {
+    pub(super) fn of(bodies: &[Body<'_>], partners: Partners, root: &Element<'_, '_>, reader: &Reader<'_>) -> Groups {
+        let paired = !partners.is_empty();
+        let (mut groups, mut excess) = Groups::with_pairs(bodies, partners);
+        if paired && excess.is_some() {
+            let note =
+                format!("pairs of geoms that their masks keep apart are left out: they need over {GROUPS} groups");
+            reader.notes.add(root, note);
+            (groups, excess) = Groups::with_pairs(bodies, Partners::new());
+        }
+        if let Some(geom) = excess {
+            let message = "has one combination of `contype` and `conaffinity` too many";
+            geom.element.problem(message, format!("expected at most {GROUPS} different combinations"));
+        }
+        groups
+    }
+
+    /// Returns the groups, and a geom that has none left.
+    fn with_pairs<'b, 'a>(bodies: &'b [Body<'a>], partners: Partners) -> (Groups, Option<&'b Geom<'a>>) {
+        let mut excess = None;
+        let mut groups = Groups { kinds: Vec::new(), partners, mixed: false };
+        let geoms = || bodies.iter().flat_map(|body| &body.geoms);
+        for geom in geoms() {
+            let alone = !geom.collides() && groups.partners_of(geom).is_none();
+            if alone || groups.kind(geom).is_some() {
                 continue;
             }
-            groups.kinds.push(geom.bits);
+            let partners = groups.partners_of(geom).cloned().unwrap_or_default();
+            groups.kinds.push(Kind { bits: geom.bits, partners, name: geom.name.clone() });
             if groups.kinds.len() == GROUPS + 1 {
-                let message = "has one combination of `contype` and `conaffinity` too many";
-                geom.element.problem(message, format!("expected at most {GROUPS} different combinations"));
+                excess = Some(geom);
                 break;
             }
         }
-        groups
+        let one = |geom: &Geom<'_>| geom.dimensions <= 1.0 && geom.friction[0] > 0.0;
+        let colliding = || geoms().filter(|geom| groups.kind(geom).is_some());
+        groups.mixed = colliding().any(one) && colliding().any(|geom| geom.dimensions > 1.0);
+        (groups, excess)
+    }
+
+    fn partners_of(&self, geom: &Geom<'_>) -> Option<&BTreeSet<String>> {
+        self.partners.get(geom.name.as_ref()?)
+    }
+
+    fn kind(&self, geom: &Geom<'_>) -> Option<usize> {
+        let (none, own) = (BTreeSet::new(), self.partners_of(geom));
+        self.kinds.iter().position(|kind| kind.bits == geom.bits && kind.partners == *own.unwrap_or(&none))
+    }
+
+    /// Returns the material of geoms with `condim="1"`, and the pair by which two of them have no friction, if the model
+    /// has geoms of both kinds. MuJoCo takes the larger `condim` of a pair, and the larger friction.
+    pub(super) fn frictionless(&self) -> Option<(MaterialSpec, PairSpec)> {
+        let (contact, appearance) = (Material { friction: 0.0, ..Material::default() }, AppearanceSpec::default());
+        let material = MaterialSpec { name: "frictionless".into(), contact, sound: None, appearance };
+        let sides = [PairSideSpec::Material(FRICTIONLESS); 2];
+        let pair = PairSpec { sides, restitution: None, friction: Some(0.0), collides: None };
+        self.mixed.then_some((material, pair))
     }
 
     /// Returns the group of a geom and the groups that it collides with. Groups that the model does
     /// not use collide with all.
     pub(super) fn group(&self, geom: &Geom<'_>) -> (CollisionGroup, u64) {
-        let [kind, affinity] = geom.bits;
-        let Some(at) = self.kinds.iter().position(|bits| *bits == geom.bits) else {
-            return (CollisionGroup::default(), 0);
-        };
-        let meets = |other: &[u32; 2]| kind & other[1] != 0 || other[0] & affinity != 0;
+        let Some(at) = self.kind(geom) else { return (CollisionGroup::default(), 0) };
         let unused = u64::MAX.checked_shl(self.kinds.len() as u32).unwrap_or(0);
-        let mask = self.kinds.iter().take(GROUPS).enumerate().filter(|(_, other)| meets(other));
+        let mask = self.kinds.iter().take(GROUPS).enumerate().filter(|(_, other)| self.kinds[at].meets(other));
         let mask = mask.fold(unused, |mask, (k, _)| mask | 1 << k);
         (CollisionGroup::new(at as u8).unwrap_or_default(), mask)
     }
@@ -57,20 +129,21 @@ impl Groups {
     /// Returns whether a geom collides with any geom of the model or of another object.
     pub(super) fn collides(&self, geom: &Geom<'_>) -> bool {
         let (_, mask) = self.group(geom);
-        geom.collides() && mask & !u64::MAX.checked_shl(self.kinds.len() as u32).unwrap_or(0) != 0
+        mask & !u64::MAX.checked_shl(self.kinds.len() as u32).unwrap_or(0) != 0
     }
 
     /// Returns the surface of a geom.
     pub(super) fn surface(&self, geom: &Geom<'_>) -> Surface {
         let (group, mask) = self.group(geom);
         let [sliding, torsional, rolling] = geom.friction;
+        let material = (self.mixed && geom.dimensions <= 1.0).then_some(FRICTIONLESS);
         let contact = Material {
-            friction: if geom.dimensions > 1.0 { sliding } else { 0.0 },
+            friction: if geom.dimensions > 1.0 || material.is_some() { sliding } else { 0.0 },
             torsional_friction: if geom.dimensions > 3.0 { torsional } else { 0.0 },
             rolling_friction: if geom.dimensions > 4.0 { rolling } else { 0.0 },
             ..Material::default()
         };
-        Surface { contact, group, mask, appearance: geom.appearance.clone(), ..Surface::default() }
+        Surface { material, contact, group, mask, appearance: geom.appearance.clone(), ..Surface::default() }
     }
 }
 

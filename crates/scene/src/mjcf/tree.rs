@@ -127,6 +127,7 @@ impl<'a> Tree<'_, 'a> {
                     self.fill(child, &Around { frame: pose, class, ..*around });
                 }
                 "replicate" => self.replicate(child, around),
+                "joint" | "freejoint" if to == 0 => element.problem("is in the world", "expected it in a <body>"),
                 "joint" | "freejoint" => {
                     let joint = JointItem::read(element, class, &around.frame, reader);
                     self.bodies[to].joints.push(named(joint, around.suffix, |joint| &mut joint.name));

@@ -1,6 +1,7 @@
 //! `<link>`: mass, collision shapes and visuals.
 
 use nalgebra::Isometry3;
+use tumble_core::Material;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 
@@ -174,6 +175,11 @@ fn read_geometry(geometry: &Element<'_, '_>, collidable: bool, context: &mut Con
 /// Reads friction and restitution of `<surface>`, and the color of `<material>`.
 fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     let mut surface = context.options.surface.clone();
+    let mu = part.child("surface").and_then(|s| s.child("friction")?.child("ode")?.child("mu"));
+    if part.tag() == "collision" && mu.is_none() && surface.contact.friction == Material::default().friction {
+        let text = format!("without `mu`: its friction is {} here, and 1 in SDFormat", surface.contact.friction);
+        note(part, &text, &mut context.notes);
+    }
     if let Some(given) = part.child("surface") {
         note_others(&given, &["friction", "bounce"], &mut context.notes);
         if let Some(bounce) = given.child("bounce") {

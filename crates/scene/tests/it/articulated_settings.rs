@@ -358,7 +358,7 @@ fn mjcf_has_fixed_links_as_bodies() {
         "[world]\ncombine_friction = \"max\"\n{TOOL}[[pair]]\na = \"robot/tool\"\nb = \"ball\"\ncollides = false\n"
     ));
     let written = MjcfWriter::new(&world).text("files");
-    assert_eq!(written.notes, Vec::<String>::new());
+    assert_eq!(written.notes, ["robot: a tree of MJCF has the name of its root body: it is read back as arm"]);
     assert!(written.text.contains("<body name=\"tool\" pos=\"1 0 0\">"), "{}", written.text);
     assert!(
         written.text.contains("body1=\"tool\" body2=\"ball\"")

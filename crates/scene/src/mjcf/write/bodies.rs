@@ -19,7 +19,7 @@ impl MjcfWriter<'_> {
             return;
         };
         let pose = body.frame_of(&part.pose);
-        let label = self.bodies.unique(name.to_string());
+        let label = self.body_label(name);
         self.names.insert((id, None), label.clone());
         if status.mode == Mode::Static {
             self.rigid_geoms(name, body, &pose, status.collidable, Some(&label));
@@ -38,13 +38,14 @@ impl MjcfWriter<'_> {
             _ => t.put_number(0.0, "gravcomp", 1.0 - body.gravity_scale),
         }
         self.xml.open("body", &t);
+        let mass = LinkMass { mass: body.mass(), center: body.center_of_mass(), inertia: *body.inertia() };
+        if status.mode == Mode::Kinematic && mass.mass.is_finite() && mass.mass > 0.0 && mass.inertia.amax() > 0.0 {
+            self.inertial(name, &mass);
+        }
         if status.mode == Mode::Dynamic {
             let joint = self.joints.unique(name.to_string());
             self.xml.leaf("freejoint", &Attributes::of("name", joint));
-            self.inertial(
-                name,
-                &LinkMass { mass: body.mass(), center: body.center_of_mass(), inertia: *body.inertia() },
-            );
+            self.inertial(name, &mass);
             let (q, spin) = (pose.rotation, center.angular_velocity);
             let velocity = center.velocity - spin.cross(&(q * body.center_of_mass()));
             self.qpos.extend(pose.translation.vector.iter().chain(&[q.w, q.i, q.j, q.k]));
@@ -81,6 +82,20 @@ impl MjcfWriter<'_> {
             || !body.light().map_or(&[][..], |l| l.lights()).is_empty()
         {
             self.note(name, "cameras and lights are left out");
+        }
+    }
+
+    /// Returns the name of a new body: the given one, or one with a number, with a note.
+    pub(super) fn body_label(&mut self, name: &str) -> String {
+        let label = self.bodies.unique(name.to_owned());
+        self.note_rename("body", (name, name), &label);
+        label
+    }
+
+    /// Notes that something has another name in the model, since names are unique there.
+    pub(super) fn note_rename(&mut self, kind: &str, (subject, name): (&str, &str), label: &str) {
+        if label != name {
+            self.note(subject, format!("its name is taken by another {kind} of the model: it is read back as {label}"));
         }
     }
 

@@ -18,11 +18,13 @@ impl MjcfWriter<'_> {
         let drawn = tree.body.visuals_of_links().any(|(own, visual)| own == number && visual.drawn().is_some());
         let collides = tree.body.parts_of_link(&frame.name).is_ok_and(|parts| !parts.is_empty());
         if frame.mass == LinkMass::none() && !drawn && !collides {
-            let mut t = Attributes::of("name", self.sites.unique(frame.name.clone()));
+            let label = self.sites.unique(frame.name.clone());
+            self.note_rename("site", (&frame.name, &frame.name), &label);
+            let mut t = Attributes::of("name", label);
             t.put_pose(&frame.pose);
             return self.xml.leaf("site", &t);
         }
-        let label = self.bodies.unique(frame.name.clone());
+        let label = self.body_label(&frame.name);
         let mut t = Attributes::of("name", &label);
         t.put_pose(&frame.pose);
         self.xml.open("body", &t);

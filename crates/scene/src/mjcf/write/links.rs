@@ -39,7 +39,7 @@ pub(super) struct Tree<'b> {
     pub(super) collidable: bool,
     children: Vec<Vec<usize>>,
     /// Names of its joints by link.
-    joints: Vec<String>,
+    pub(super) joints: Vec<String>,
     /// Whether it has a body for its base: the base carries something, or several roots.
     based: bool,
 }
@@ -59,7 +59,9 @@ impl MjcfWriter<'_> {
         let known = self.joint_names.get(name).cloned().unwrap_or_default();
         let joints = links.iter().enumerate().map(|(k, link)| {
             let own = known.get(k).filter(|_| known.len() == links.len()).unwrap_or(&link.name);
-            self.joints.unique(own.to_string())
+            let label = self.joints.unique(own.to_string());
+            self.note_rename("joint", (&format!("joint {own} of {name}"), own), &label);
+            label
         });
         let joints = joints.collect::<Vec<_>>();
         for (link, joint) in links.iter().zip(&joints).filter(|(link, _)| link.joint.dof() == 1) {
@@ -118,10 +120,19 @@ impl MjcfWriter<'_> {
         }
         let links = tree.body.model().links();
         let link = &links[k];
-        let label = self.bodies.unique(link.name.clone());
+        let label = self.body_label(&link.name);
         for link in &chain {
             self.names.insert((tree.id, Some(*link)), label.clone());
             self.inner.extend((*link != k).then_some((tree.id, Some(*link))));
+            let read = format!("{label}/{}", tree.joints[*link]);
+            if *link != k && links[*link].name != read {
+                let note = format!("a massless link with one child is a joint of its body, and is read back as {read}");
+                self.note(&links[*link].name, note);
+            }
+        }
+        if links[chain[0]].parent.is_none() && label != tree.name {
+            let note = format!("a tree of MJCF has the name of its root body: it is read back as {label}");
+            self.note(tree.name, note);
         }
         let mut t = Attributes::of("name", label);
         let placed = chain.iter().fold(Pose::identity(), |pose, k| pose * tree.placement(&links[*k]));
@@ -297,36 +308,6 @@ impl MjcfWriter<'_> {
                 } else if meets && neighbors {
                     self.note(&names[0], "links of one joint that collide: MuJoCo leaves out such contacts");
                 }
-            }
-        }
-    }
-
-    /// Writes drives as actuators: `f = g·u + b₀ + b₁·q + b₂·q̇`.
-    fn drives(&mut self, tree: &Tree<'_>) {
-        for (k, link) in tree.body.model().links().iter().enumerate().filter(|(_, link)| link.joint.dof() == 1) {
-            let dof = &tree.body.dofs()[link.v];
-            let joint = &tree.joints[k];
-            let DofSettings { drive, .. } = dof;
-            match drive {
-                Drive::None => {}
-                Drive::Position { stiffness, damping, target, velocity, limit } => {
-                    let (gain, constant, control) = match *stiffness > 0.0 {
-                        true => (*stiffness, damping * velocity, *target),
-                        false => (*damping, 0.0, *velocity),
-                    };
-                    let mut t = Attributes::of("name", self.actuators.unique(joint.to_string())).with("joint", joint);
-                    t = t.with("gaintype", "fixed").with("gainprm", numbers([gain])).with("biastype", "affine");
-                    t.put("biasprm", numbers([constant, -stiffness, -damping]));
-                    if limit.is_finite() {
-                        t.put("forcerange", numbers([-limit, *limit]));
-                    }
-                    self.controls.push(control);
-                    self.drive_elements.push(("general", t));
-                }
-                Drive::Velocity { .. } => {
-                    self.note(joint, "velocity drives, which hold their velocity exactly, are left out")
-                }
-                Drive::Playback { .. } => self.note(joint, "playback drives are left out"),
             }
         }
     }

@@ -7,13 +7,14 @@
 //! | kinematic, dynamic rigid bodies | bodies with `mocap`, with `<freejoint>` |
 //! | articulated bodies | trees of `<body>`; links that are folded into others become `<site>` |
 //! | limits, springs, damping, dry friction, armature, effort | attributes of `<joint>` |
-//! | position drives | `<general>` actuators |
+//! | position drives; motors and actuators of the scene that no drive includes | `<general>` actuators |
 //! | couplings; spherical and fixed loop joints | `<joint>`, `<connect>` by sites, `<weld>` of `<equality>` |
 //! | collision groups; pairs that do not collide | `contype`, `conaffinity`; `<exclude>` |
 //! | the present state | the keyframe `now` |
 //!
 //! Everything else is a note.
 
+mod actuators;
 mod bodies;
 mod fixed_links;
 mod geoms;
@@ -32,6 +33,7 @@ use super::names::Taken;
 use crate::notes::{NoteList, Notes};
 use crate::parse::file::SceneFile;
 use crate::save::place::{Fault, Unfinished};
+use actuators::Motor;
 use geoms::{Assets, Groups};
 use joints::Carrier;
 use xml::{Attributes, Xml, numbers, vector};
@@ -87,6 +89,8 @@ pub struct MjcfWriter<'w> {
     world: &'w World,
     model: String,
     joint_names: BTreeMap<String, Vec<String>>,
+    /// Motors of the scene, and its other actuators that no drive includes.
+    motors: Vec<Motor>,
     folder: String,
     xml: Xml,
     assets: Assets,
@@ -125,6 +129,7 @@ impl<'w> MjcfWriter<'w> {
             world,
             model: "tumble".into(),
             joint_names: BTreeMap::new(),
+            motors: Vec::new(),
             folder: String::new(),
             xml: Xml::default(),
             assets: Assets::default(),
@@ -150,12 +155,13 @@ impl<'w> MjcfWriter<'w> {
         }
     }
 
-    /// Takes the names of joints from the scene that the world was built from.
+    /// Takes the names of joints, motors and actuators that no drive includes from the scene that the world was built from.
     #[must_use]
     pub fn like(mut self, scene: &SceneFile) -> Self {
         for spec in &scene.articulated {
             self.joint_names.insert(spec.name.clone(), crate::build::articulated::moving_joints(&spec.links));
         }
+        self.motors = Motor::all(scene);
         self
     }
 
@@ -229,6 +235,7 @@ impl<'w> MjcfWriter<'w> {
                 self.coupling(name, mimic);
             }
         }
+        self.motors();
         self.pairs();
     }
 
@@ -276,15 +283,13 @@ impl<'w> MjcfWriter<'w> {
         head.section("contact", &self.contacts);
         head.section("equality", &self.equalities);
         head.section("actuator", &self.drive_elements);
-        if !self.qpos.is_empty() {
-            let mut key = Attributes::of("name", NOW).with("time", numbers([self.world.time()]));
-            key.put("qpos", numbers(self.qpos.iter().copied()));
-            key.put("qvel", numbers(self.qvel.iter().copied()));
-            if !self.controls.is_empty() {
-                key.put("ctrl", numbers(self.controls.iter().copied()));
+        let mut key = Attributes::of("name", NOW).with("time", numbers([self.world.time()]));
+        for (name, list) in [("qpos", &self.qpos), ("qvel", &self.qvel), ("ctrl", &self.controls)] {
+            if !list.is_empty() {
+                key.put(name, numbers(list.iter().copied()));
             }
-            head.section("keyframe", &[("key", key)]);
         }
+        head.section("keyframe", &[("key", key)]);
         MjcfText { text: head.finish(), files: self.assets.files, notes: self.notes.take() }
     }
 
