@@ -227,7 +227,8 @@ def test_a_world_that_fails_is_named_and_the_others_step(arm_world):
         (lambda b: b.step(np.zeros((2, 6))), r"controls: expected shape \(6,\) or \(3, 6\), got \(2, 6\)"),
         (lambda b: b.step([np.nan] * 6), "controls: number 0 is NaN"),
         (lambda b: b.step(targets=np.zeros(5)), r"targets: expected shape \(6,\) or \(3, 6\), got \(5,\)"),
-        (lambda b: b.step(substeps=-1), "substeps is -1; expected a whole number from 1 to 1000"),
+        (lambda b: b.step(substeps=-1), r"substeps is -1; expected a whole number from 0 to 2\*\*40"),
+        (lambda b: b.step(substeps=2**40 + 1), r"substeps is 1099511627777; expected a whole number from 0 to 2\*\*40"),
         (lambda b: b.step(mask=[True]), r"mask: expected booleans, shape \(3,\)"),
         (lambda b: b.reset(np.zeros((3, 1), bool)), r"mask: expected booleans"),
         (lambda b: b.reset(state=np.zeros(3)), r"state: expected shape \(38,\) or \(3, 38\)"),
@@ -248,6 +249,7 @@ def test_wrong_arguments_are_refused(arm_world, call, words):
         ({"n": 2, "threads": 0}, "threads is 0"),
         ({"n": 2, "articulations": ["ball"]}, "expected articulations"),
         ({"n": 2, "articulations": ["leg"]}, "no body named 'leg'"),
+        ({"n": 2, "articulations": ["arm", "arm"]}, "articulations: number 1 is there twice"),
         ({"n": 2, "configure": lambda world, k: world.remove("ball")}, "bodies or joints were added .* or removed"),
     ],
 )

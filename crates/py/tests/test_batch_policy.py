@@ -1,9 +1,13 @@
 """Policies inside the steps of a batch, and constants of bodies by world: each beside a loop over single worlds."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
 import tumble
+import tumble.distributed
 
 
 @pytest.fixture
@@ -99,3 +103,26 @@ def test_constants_of_a_body_by_world_are_a_loop_over_worlds():
         batch.set_body("bax", mass=1.0)
     with pytest.raises(tumble.InvalidValueError, match="shape \\(3,\\)"):
         batch.set_body("box", friction=np.ones(2))
+
+
+@pytest.mark.parametrize("several", [None, 3])
+@pytest.mark.parametrize("activation", ["tanh", "relu"])
+def test_a_pickled_policy_is_the_same_map(several, activation):
+    rng = np.random.default_rng(5)
+    policy = tumble.Policy([*layers(rng, [4, 6], several), (layers(rng, [6, 2], several)[0][0], None)], activation=activation)
+    for other in (pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)):
+        for i in range(several or 1):
+            seen = rng.normal(size=4)
+            assert (other(seen, i) == policy(seen, i)).all()
+        assert pickle.dumps(other) == pickle.dumps(policy)
+
+
+def test_a_policy_is_a_job(tmp_path):
+    job = tumble.Policy([(np.ones((1, 2)), None)])
+    other = tumble.Policy([(np.ones((1, 2)), None)], activation="relu")
+    assert tumble.distributed.key(sums, job) == tumble.distributed.key(sums, copy.copy(job)) != tumble.distributed.key(sums, other)
+    assert tumble.distributed.map(sums, [job, job], store=tmp_path) == [3.0, 3.0]
+
+
+def sums(policy):
+    return float(policy([1.0, 2.0])[0])

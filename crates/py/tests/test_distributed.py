@@ -3,6 +3,7 @@
 import functools
 import importlib.util
 import io
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -307,3 +308,32 @@ def test_without_the_package_the_error_names_it(engine, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ImportError, match=f"engine '{engine}' needs the package {package}: pip install"):
         tumble.distributed.connect(engine)
+
+
+@pytest.mark.parametrize("engine", [None, lambda: ThreadPoolExecutor(2)])
+def test_equal_jobs_run_once(engine, tmp_path):
+    ran, seen = tmp_path / "ran", []
+    ran.mkdir()
+    jobs = [(ran, number) for number in (3, 4, 3, 3, 4, 3)]
+    assert tumble.distributed.map(count_up, jobs, engine=engine, store=tmp_path / "store", progress=seen.append) == [9, 16, 9, 9, 16, 9]
+    assert len(list(ran.iterdir())) == 2 and len(seen) == 6 and seen[-1].looked_up == 4
+
+
+@pytest.mark.parametrize("engine", [None, lambda: ThreadPoolExecutor(2)])
+def test_equal_jobs_have_one_error(engine, tmp_path):
+    results = tumble.distributed.map(divide, [0, 1, 0], engine=engine, store=tmp_path, errors="return")
+    assert results[1] == 12 and [(each.number, type(each.__cause__)) for each in results[::2]] == [(0, ZeroDivisionError), (2, ZeroDivisionError)]
+
+
+def test_equal_jobs_without_end_are_taken_as_workers_are_free(tmp_path):
+    endless = itertools.repeat(2)
+    found = tumble.distributed.as_completed(divide, endless, engine=lambda: ThreadPoolExecutor(2), store=tmp_path)
+    assert {number: result for number, result in itertools.islice(found, 20)} == dict.fromkeys(range(20), 6)
+
+
+def test_a_closed_client_of_dask_is_refused():
+    pytest.importorskip("distributed", reason="SKIPPED: distributed is not installed; scripts/test_python.sh installs it")
+    engine = tumble.distributed.connect("dask", workers=1)
+    engine.close()
+    with pytest.raises(ValueError, match="this client of Dask is closed"):
+        tumble.distributed.map(divide, [1], engine=engine)

@@ -1,5 +1,7 @@
 """Several robots in one world: PettingZoo's own test, what agents see of each other, ends, errors."""
 
+import copy
+import pickle
 import warnings
 
 import numpy as np
@@ -121,3 +123,16 @@ def test_wrong_arguments_are_refused():
 
     with pytest.raises(KeyError, match="'left' has no joint named 'wheel'"):
         tumble_gym.ParallelEnv(Lost())
+
+
+def test_a_pickled_environment_goes_on_alike():
+    env = tumble_gym.ParallelEnv(Duel(), max_cycles=5)
+    env.reset(seed=2)
+    actions = {"left": np.array([0.5]), "right": np.array([-1.0])}
+    env.step(actions)
+    copies = pickle.loads(pickle.dumps(env)), copy.deepcopy(env)
+    seen, rewards, *_ = env.step(actions)
+    for each in copies:
+        again = each.step(actions)
+        assert again[1] == rewards and all((again[0][agent] == seen[agent]).all() for agent in Duel.AGENTS)
+        assert (each.reset()[0]["left"] != seen["left"]).any() and each.world is not env.world

@@ -1,7 +1,13 @@
 """The shipped tasks: gymnasium's own check, observations and rewards by their definitions written out again, and beside gymnasium's own environments with
 MuJoCo where that is installed."""
 
+import ast
+import copy
+import dataclasses
+import pickle
+import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -311,3 +317,113 @@ def test_beside_gymnasium_s_own_environment(name):
             rows = slice(6, None) if name in FREE else slice(body.dof)
             inertia = inertia[: body.dof, : body.dof]
             assert body.mass_matrix(q[: body.nq])[rows, rows] == pytest.approx(inertia[rows, rows], rel=1e-6, abs=1e-6)
+
+
+PICTURES = {"xml_file", "default_camera_config"}  # parameters of gymnasium's environments that are of files and pictures alone
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parameters_are_those_of_gymnasium(name):
+    """Read from the source, which needs no MuJoCo."""
+    folder = Path(gymnasium.__file__).parent / "envs" / "mujoco"
+    stem = "humanoidstandup" if name == "HumanoidStandup" else re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
+    tree = ast.parse((folder / f"{stem}_v5.py").read_text(encoding="utf-8"))
+    (start,) = (each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef) and each.name == "__init__")
+    arguments = start.args.args[1:]
+    theirs = {each.arg: ast.unparse(default) for each, default in zip(arguments, start.args.defaults, strict=True)}
+    task = getattr(tumble_gym, f"{name}Task")()
+    own = {each.name: getattr(task, each.name) for each in dataclasses.fields(task)}
+    assert theirs.keys() - own.keys() == PICTURES
+    own["frame_skip"] = task.steps
+    for parameter, default in theirs.items():
+        if parameter not in PICTURES:
+            assert own[parameter] == eval(default, {"np": np}), parameter
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "q", "over"),
+    [
+        ("Hopper", {"healthy_z_range": (0.5, 2.0)}, [0, 0.69, 0, 0, 0, 0], False),
+        ("Hopper", {"healthy_z_range": (0.5, 2.0)}, [0, 2.1, 0, 0, 0, 0], True),
+        ("Hopper", {"healthy_angle_range": (-0.1, 0.3)}, [0, 1.3, 0.25, 0, 0, 0], False),
+        ("Hopper", {"healthy_angle_range": (-0.1, 0.3)}, [0, 1.3, -0.15, 0, 0, 0], True),
+        ("Hopper", {"healthy_state_range": (-0.5, 100)}, [0, 1.3, 0, 0, -0.6, 0], True),
+        ("Hopper", {"healthy_state_range": (-0.7, 100)}, [0, 1.3, 0, 0, -0.6, 0], False),
+        ("Walker2d", {"healthy_z_range": (0.5, 1.0)}, [0, 1.5, 0, 0, 0, 0, 0, 0, 0], True),
+        ("Walker2d", {"healthy_angle_range": (-2, 1)}, [0, 1.5, -1.01, 0, 0, 0, 0, 0, 0], False),
+        ("Ant", {"healthy_z_range": (0.1, 0.2)}, [0, 0, 0.21, 0, 0, 0, 1, *[0.0] * 8], True),
+        ("Ant", {"healthy_z_range": (0.1, 0.2)}, [0, 0, 0.15, 0, 0, 0, 1, *[0.0] * 8], False),
+    ],
+)
+def test_ranges_say_when_an_episode_ends(name, parameters, q, over):
+    env = tumble_gym.Env(name, **parameters)
+    env.reset(seed=0)
+    env.runs.batch.reset(q=q, v=np.zeros(env.runs.batch.dof))
+    assert env.task.terminated(tumble_gym.State.of(env.runs.batch)).tolist() == [over]
+
+
+def test_frame_skip_is_that_many_steps_of_the_world():
+    once, twice = tumble_gym.Env("HalfCheetah", frame_skip=3), tumble_gym.Env("HalfCheetah", frame_skip=6)
+    once.reset(seed=1), twice.reset(seed=1)
+    action = np.linspace(-1, 1, 6)
+    once.step(action)
+    assert (once.step(action)[0] == twice.step(action)[0]).all()
+    assert once.runs.dt == pytest.approx(0.03)
+    assert once.metadata["render_fps"] == 33
+
+
+def test_the_ant_s_main_body_and_range_of_forces():
+    thigh, torso = after("Ant", 27, main_body="thigh_2", contact_force_range=(-3.0, 2.0)), after("Ant", 27)
+    env, (before, _), (q, _), _, (seen, _, _, _, info) = thigh
+    body = env.world.articulation("torso")
+    way = body.link_pose("thigh_2", q)[:2] - body.link_pose("thigh_2", before)[:2]
+    assert [info["x_velocity"], info["y_velocity"]] == pytest.approx(list(way / 0.05)) and info["x_position"] == q[0]
+    assert info["x_velocity"] != torso[-1][-1]["x_velocity"] and (torso[2][0] == q).all()
+    wide = seen[27:]
+    assert wide.max() == 2.0 and -3 <= wide.min() < -1 and (np.clip(wide, -1, 1) == torso[-1][0][27:]).all()
+    assert info["reward_contact"] == pytest.approx(-5e-4 * (wide**2).sum())
+    assert tumble_gym.AntTask(main_body=6).BODIES[5] == "thigh_2"
+    assert after("Ant", 27, main_body=6)[-1][-1]["x_velocity"] == info["x_velocity"]
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "error", "words"),
+    [
+        ("Hopper", {"healthy_rewrd": 1}, TypeError, "did you mean 'healthy_reward'"),
+        ("Hopper", {"xml_file": "hopper.xml"}, TypeError, "'xml_file'; there are .*healthy_z_range"),
+        ("Hopper", {"frame_skip": 0}, ValueError, "frame_skip is 0; it must be a whole number of at least 1"),
+        ("Hopper", {"frame_skip": 1.5}, ValueError, "frame_skip is 1.5"),
+        ("Hopper", {"healthy_z_range": (2, 1)}, ValueError, r"healthy_z_range is \(2, 1\); it must be a pair of numbers, the lower one first"),
+        ("Walker2d", {"healthy_angle_range": 3}, ValueError, "healthy_angle_range is 3; it must be a pair"),
+        ("Ant", {"main_body": 0}, ValueError, "main_body is 0; it must be 1 to 13, or one of torso"),
+        ("Ant", {"main_body": "head"}, ValueError, "main_body is 'head'"),
+    ],
+)
+def test_wrong_parameters_are_refused(name, parameters, error, words):
+    for make in (tumble_gym.Env, tumble_gym.VectorEnv):
+        with pytest.raises(error, match=words):
+            make(name, **parameters)
+
+
+def test_a_made_task_takes_no_parameters():
+    with pytest.raises(TypeError, match="frame_skip: the task is made already; give its parameters to HopperTask"):
+        tumble_gym.Env(tumble_gym.HopperTask(), frame_skip=2)
+
+
+def test_an_unknown_motor_is_refused():
+    class Lost(tumble_gym.HopperTask):
+        MOTORS = (("wheel", 1.0),)
+
+    with pytest.raises(KeyError, match="'torso' has no joint named 'wheel'; there are x, z, turn, hip"):
+        tumble_gym.Env(Lost)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_pickled_environment_goes_on_alike(name):
+    env = after(name, 3)[0]
+    action = env.action_space.sample()
+    copies = pickle.loads(pickle.dumps(env)), copy.deepcopy(env)
+    seen, reward, *_ = env.step(action)
+    for each in copies:
+        again = each.step(action)
+        assert (again[0] == seen).all() and again[1] == reward

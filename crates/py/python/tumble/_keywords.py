@@ -5,11 +5,20 @@ from __future__ import annotations
 import difflib
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Class = TypeVar("_Class", bound=type)
+
+
+def refuse_unknown(place: str, words: Iterable[str], known: Sequence[str]) -> None:
+    """Raises ``TypeError`` for the first word that is not known. place: what was called."""
+    for word in words:
+        if word not in known:
+            near = difflib.get_close_matches(word, known, 1, 0.6)
+            hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}"
+            raise TypeError(f"{place}() got an unexpected keyword argument '{word}'; {hint}")
 
 
 def hinted(function: _Function) -> _Function:
@@ -21,11 +30,7 @@ def hinted(function: _Function) -> _Function:
 
     @functools.wraps(function)
     def call(*args: Any, **words: Any) -> Any:
-        for word in words:
-            if word not in known:
-                near = difflib.get_close_matches(word, known, 1, 0.6)
-                hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}"
-                raise TypeError(f"{place}() got an unexpected keyword argument '{word}'; {hint}")
+        refuse_unknown(place, words, known)
         return function(*args, **words)
 
     return call  # type: ignore[return-value]

@@ -2459,7 +2459,7 @@ class Batch:
         policy: Policy | None = None,
         mask: ArrayLike | None = None,
     ) -> None:
-        """Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
+        """Advances each world by ``substeps`` steps of its ``dt``, from 0 to 2**40, with the interpreter released; Ctrl-C
         stops all of them between two steps.
 
         controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape

@@ -45,6 +45,11 @@ fn named<T: Whole>(value: &Bound<'_, PyAny>, name: &str, expected: &str) -> PyRe
     })
 }
 
+/// Converts the argument `substeps` of `Batch.step`: steps of a world, as those of `World.step`, and not the sub-steps in one.
+pub fn steps_of_a_batch(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    named(value, "substeps", "a whole number from 0 to 2**40")
+}
+
 /// Makes the functions: the range of a name is that of its type if none is given here.
 macro_rules! names {
     ($($name:ident $(: $expected:literal)?,)+) => { $(

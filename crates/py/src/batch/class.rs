@@ -225,7 +225,7 @@ impl Batch {
         Ok(Batch::of(worlds, layout, crew, starts, configure.is_some(), vec![false; n], memory))
     }
 
-    /// Advances each world by ``substeps`` steps of its ``dt``, with the interpreter released; Ctrl-C
+    /// Advances each world by ``substeps`` steps of its ``dt``, from 0 to 2**40, with the interpreter released; Ctrl-C
     /// stops all of them between two steps.
     ///
     /// controls: generalized forces on the degrees of freedom of the articulations, N·m and N, shape
@@ -244,7 +244,7 @@ impl Batch {
         &self,
         py: Python<'_>,
         controls: Option<&Bound<'_, PyAny>>,
-        #[pyo3(from_py_with = whole::substeps)] substeps: usize,
+        #[pyo3(from_py_with = whole::steps_of_a_batch)] substeps: usize,
         targets: Option<&Bound<'_, PyAny>>,
         policy: Option<&Bound<'_, Policy>>,
         mask: Option<&Bound<'_, PyAny>>,
@@ -259,7 +259,7 @@ impl Batch {
             p.check(self.shared.len(), self.layout.positions() + self.layout.dof(), self.layout.dof())
         })?;
         if substeps > MOST_STEPS {
-            return Err(Error::value(format!("substeps is {substeps}; it must be at most {MOST_STEPS}")));
+            return Err(Error::value(format!("substeps is {substeps}; expected a whole number from 0 to 2**40")));
         }
         let dof = self.layout.dof();
         let (controls, targets) = (self.rows("controls", controls, dof)?, self.rows("targets", targets, dof)?);

@@ -49,7 +49,10 @@ impl Layout {
             let x = view.state_range(id).map(|span| span.x.clone()).ok_or_else(none)?;
             Ok(Driven { id, x, positions: robot.positions(), dof: robot.dof(), links: robot.model.frames().len() })
         });
-        let driven = driven.collect::<Result<Vec<_>>>()?;
+        let driven = driven.collect::<Result<Vec<Driven>>>()?;
+        if let Some(k) = (1..driven.len()).find(|k| driven[..*k].iter().any(|one| one.id == driven[*k].id)) {
+            return Err(Error::value(format!("articulations: number {k} is there twice; name each once")));
+        }
         let objects = inner.world.ids().iter().copied().filter(|id| !inner.forces().contains(id)).collect();
         Ok(Layout { state: inner.world.state().len(), objects, bodies, driven })
     }

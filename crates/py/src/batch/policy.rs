@@ -13,6 +13,7 @@ use crate::errors::{Error, Result};
 use crate::keywords::{self, Unknown};
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// Largest number of layers.
 const MOST_LAYERS: usize = 16;
@@ -22,6 +23,9 @@ enum Activation {
     Tanh,
     Relu,
 }
+
+/// Weights and offsets of a layer, as arrays.
+type Pair<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// One layer: weights and offsets of one policy, or of several, one after the other.
 struct Layer {
@@ -89,6 +93,15 @@ impl Policy {
 }
 
 impl Activation {
+    const ALL: [Activation; 2] = [Activation::Tanh, Activation::Relu];
+
+    fn name(self) -> &'static str {
+        match self {
+            Activation::Tanh => "tanh",
+            Activation::Relu => "relu",
+        }
+    }
+
     fn of(self, x: f64) -> f64 {
         match self {
             Activation::Tanh => nalgebra::ComplexField::tanh(x),
@@ -117,6 +130,16 @@ impl Layer {
         Ok((Layer { inputs, outputs, weights: weights.data, offsets }, several))
     }
 
+    /// Returns weights and offsets in the shapes in which they were given. `several`: the number of policies, 0 for one of all worlds.
+    fn arrays<'py>(&self, py: Python<'py>, several: usize) -> Result<Pair<'py>> {
+        let shaped = |values: &[f64], shape: &[usize]| {
+            let shape = if several == 0 { shape.to_vec() } else { [&[several], shape].concat() };
+            array(py, values).call_method1("reshape", (shape,))
+        };
+        let weights = shaped(&self.weights, &[self.outputs, self.inputs])?;
+        Ok((weights, shaped(&self.offsets, &[self.outputs])?))
+    }
+
     fn apply(&self, policy: usize, x: &[f64], y: &mut Vec<f64>) {
         let weights = &self.weights[policy * self.outputs * self.inputs..];
         let offsets = &self.offsets[policy * self.outputs..][..self.outputs];
@@ -137,11 +160,8 @@ impl Policy {
         unknown: Option<Unknown<'_, '_>>,
     ) -> Result<Policy> {
         keywords::check(unknown, "Policy")?;
-        let activation = match activation {
-            "tanh" => Activation::Tanh,
-            "relu" => Activation::Relu,
-            other => return Err(Error::Name(format!("unknown activation '{other}'; there are 'tanh' and 'relu'"))),
-        };
+        let unknown = || Error::Name(format!("unknown activation '{activation}'; there are 'tanh' and 'relu'"));
+        let activation = Activation::ALL.into_iter().find(|a| a.name() == activation).ok_or_else(unknown)?;
         if layers.is_empty() || layers.len() > MOST_LAYERS {
             return Err(Error::value(format!("layers: {} given; a policy has 1 to {MOST_LAYERS}", layers.len())));
         }
@@ -161,6 +181,16 @@ impl Policy {
             policy.layers.push(layer);
         }
         Ok(policy)
+    }
+
+    /// Pickles the arguments of the constructor.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Result<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let layers = own.layers.iter().map(|layer| layer.arrays(py, own.several)).collect::<Result<Vec<_>>>()?;
+        let words = PyDict::new(py);
+        words.set_item("activation", own.activation.name())?;
+        let arguments = (slf.get_type(), (layers,), words).into_pyobject(py)?;
+        Ok((py.import("copyreg")?.getattr("__newobj_ex__")?, arguments.into_any()))
     }
 
     /// Returns the outputs for an observation, shape (inputs,), by the i-th policy.

@@ -37,8 +37,8 @@ def map(
 
     function: pure, of one argument: the same job gives the same result in any process, where ``tumble`` and what it imports are installed.
     ``functools.partial(tumble.simulate, model, snapshot)`` is one. engine, workers: as in ``connect``; what is not an ``Engine`` yet and is started here is
-    stopped at the end. store: a folder of results by content hash: a job whose result is there is not run again, and results are there as soon as they
-    arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again
+    stopped at the end. store: a folder of results by content hash: a job whose result is there is not run again, equal jobs run once, and results are there
+    as soon as they arrive, so a run that was interrupted goes on where it was. version: counts in the hash, see ``key``. retries: how often at most a job is tried again
     after its worker died; a Dask cluster that was not started here counts by its own ``allowed-failures``; exceptions of the function are not tried again.
     timeout_s: longest time without any job that finishes, s; without effect in this process, ``engine=None``. progress: ``True`` for a bar on a terminal, or
     a function that is called with a ``Progress`` after each job.
@@ -92,7 +92,8 @@ def as_completed(
             if known is not None:
                 yield number, pickle.loads(known)
                 continue
-            run.submit(number, job)
+            if not run.waits_for_equal(number):
+                run.submit(number, job)
             while run.full():
                 yield from run.arrived()
             if run.many_lost():
@@ -119,6 +120,12 @@ class _Run:
         self.session: Session | None = None
         self.running: dict[int, Any] = {}
         self.keys: dict[int, str] = {}
+        self.first: dict[str, int] = {}
+        """The job with a key that has no result yet."""
+        self.equal: dict[int, list[int]] = {}
+        """Later jobs with the key of such a one, which get its result."""
+        self.waiting = 0
+        """How many those are."""
         self.lost: deque[tuple[int, Any]] = deque()
         """Jobs whose workers died: they may have died of another job, so each of them is tried alone."""
         self.deaths: dict[int, int] = {}
@@ -136,6 +143,16 @@ class _Run:
             self.count.add(looked_up=True)
         return known
 
+    def waits_for_equal(self, number: int) -> bool:
+        """Whether an equal job has no result yet; then this one is not run, and gets that result."""
+        key = self.keys.get(number)
+        if key is None or self.first.setdefault(key, number) == number:
+            return False
+        self.equal.setdefault(self.first[key], []).append(number)
+        self.waiting += 1
+        del self.keys[number]
+        return True
+
     def submit(self, number: int, job: Any) -> None:
         if self.session is None:  # nothing is started for jobs that are all known
             self.engine = connect(self.given, workers=self.workers)
@@ -151,10 +168,10 @@ class _Run:
             self.session = self.engine.session(self.function, retries)
 
     def full(self) -> bool:
-        return self.session is not None and len(self.running) >= self.session.slots
+        return self.session is not None and len(self.running) > 0 and len(self.running) + self.waiting >= self.session.slots
 
     def many_lost(self) -> bool:
-        return self.session is not None and len(self.lost) > self.session.slots
+        return self.session is not None and len(self.lost) > 0 and len(self.lost) + self.waiting > self.session.slots
 
     def rest(self) -> Iterator[tuple[int, Any]]:
         """Waits for all jobs at the engine, then tries the lost ones alone."""
@@ -174,15 +191,16 @@ class _Run:
         outcomes = self.session.finished(self.timeout_s)
         if not outcomes:
             raise TimeoutError(f"no job finished within {self.timeout_s} s; {len(self.running)} are at the engine")
-        ready = []
+        ready: list[tuple[int, Any, bool]] = []
         for number, outcome in outcomes:
             job = self.running.pop(number)
             if outcome.payload is None and self.again(number, alone):
                 self.lost.append((number, job))
             else:
-                ready.append((number, self.keep(number, outcome)))
-        for number, result in ready:
-            self.count.add(ok=not isinstance(result, JobError))
+                ready += [(each, result, each != number) for each, result in self.keep(number, outcome)]
+        for number, result, equal in ready:
+            ok = not isinstance(result, JobError)
+            self.count.add(ok=ok, looked_up=ok and equal)
             yield number, result
 
     def again(self, number: int, alone: bool) -> bool:
@@ -191,14 +209,17 @@ class _Run:
         self.deaths[number] = self.deaths.get(number, 0) + alone
         return self.deaths[number] < (min(self.retries, 1) if self.session.retries_itself else self.retries)
 
-    def keep(self, number: int, outcome: Outcome) -> Any:
-        """Returns the result of a job, which is put into the store, or its error."""
-        key = self.keys.pop(number, None)
+    def keep(self, number: int, outcome: Outcome) -> list[tuple[int, Any]]:
+        """Returns the result of a job, which is put into the store, or its error: for it, and for all equal ones that wait for it."""
+        key, equal = self.keys.pop(number, None), self.equal.pop(number, [])
+        self.waiting -= len(equal)
+        if key is not None:
+            self.first.pop(key, None)
         if not outcome.ok or outcome.payload is None:
-            return error_of(number, outcome)
+            return [(each, error_of(each, outcome)) for each in (number, *equal)]
         if self.store is not None and key is not None:
             self.store.put(key, outcome.payload)
-        return pickle.loads(outcome.payload)
+        return [(each, pickle.loads(outcome.payload)) for each in (number, *equal)]
 
     def close(self) -> None:
         try:

@@ -11,6 +11,7 @@ import uuid
 from collections.abc import Callable
 from typing import Any
 
+from tumble._errors import InvalidValueError
 from tumble.distributed.calls import Outcome, call_packed, pack
 from tumble.distributed.engines import STOP_S, Engine, Results, Session
 
@@ -49,6 +50,8 @@ class Dask(Engine):
         self.client, self.cluster, self.started = client, cluster, started
 
     def session(self, function: Callable[[Any], Any], retries: int) -> Session:
+        if self.client.status in ("closed", "closing"):
+            raise InvalidValueError("engine: this client of Dask is closed; open another")
         if self.cluster is not None:
             self.cluster.scheduler.allowed_failures = retries  # of a cluster elsewhere its configuration counts
         return _Session(self.client, function)

@@ -16,8 +16,8 @@ INTERVAL_S = 0.1  # between two pictures of the bar
 class Progress:
     """How far many jobs are.
 
-    done: jobs that are finished, with results or not; looked_up: those of them whose results were in the store; failed: those without result; total:
-    number of all jobs, None while it is not known; elapsed_s: time since the start, s.
+    done: jobs that are finished, with results or not; looked_up: those of them whose results were in the store, or came from an equal job; failed: those
+    without result; total: number of all jobs, None while it is not known; elapsed_s: time since the start, s.
     """
 
     done: int

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -14,17 +15,32 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 import tumble
+from tumble._keywords import refuse_unknown
 from tumble.gym.task import Flags, Floats, Infos, Runs, Task
 
 
-def _made(task: Task | type[Task] | str, parameters: dict[str, Any]) -> Task:
-    """The task itself, or of a name or a class with parameters."""
+def _made(task: Task | type[Task] | str, parameters: dict[str, Any], own: Callable[..., object]) -> Task:
+    """The task itself, or of a name or a class with parameters. own: what has parameters beside those of the task."""
     if isinstance(task, str):
         found: type[Task] = getattr(importlib.import_module("tumble.gym"), f"{task}Task", Task)
         if found is Task:
             raise tumble.UnknownNameError(f"tumble.gym has no task named {task!r}")
         task = found
-    return task if isinstance(task, Task) else task(**parameters)
+    if isinstance(task, Task):
+        if parameters:
+            raise TypeError(f"{', '.join(parameters)}: the task is made already; give its parameters to {type(task).__name__}")
+        return task
+    known, open_ended = _names(task)
+    if not open_ended:
+        refuse_unknown(task.__name__, parameters, [*known, *_names(own)[0]])
+    return task(**parameters)
+
+
+def _names(function: Callable[..., Any]) -> tuple[list[str], bool]:
+    """The parameters' names, and whether there may be others."""
+    parameters = inspect.signature(function).parameters.values()
+    named = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
+    return named, any(each.kind == each.VAR_KEYWORD for each in parameters)
 
 
 def _checked(render_mode: str | None) -> str | None:
@@ -52,7 +68,7 @@ class Env(gymnasium.Env[NDArray[Any], Any]):
 
     def __init__(self, task: Task | type[Task] | str, render_mode: str | None = None, **parameters: Any) -> None:
         self.render_mode = _checked(render_mode)
-        self.task = _made(task, parameters)
+        self.task = _made(task, parameters, type(self))
         self.runs = Runs(self.task, 1, threads=1)
         self.metadata = _metadata(self.runs.dt)
         self.action_space = self.task.action_space()
@@ -114,7 +130,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[NDArray[Any], NDArray[Any], NDArray[A
     ) -> None:
         super().__init__()
         self.render_mode = _checked(render_mode)
-        self.task = _made(task, parameters)
+        self.task = _made(task, parameters, type(self))
         self.runs = Runs(self.task, num_envs, threads)
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)

@@ -187,7 +187,7 @@ class HumanoidStandupTask(_Humanoid):
     HEIGHT_M: ClassVar[float] = 0.105
 
     def reward(self, before: State, state: State, actions: NDArray[np.float64], dt: float) -> tuple[Floats, Infos]:
-        up = self.uph_cost_weight * state.q[:, 2] / (dt / self.FRAME_SKIP)
+        up = self.uph_cost_weight * state.q[:, 2] / (dt / self.steps)
         effort = self.ctrl_cost_weight * np.square(actions).sum(axis=1)
         impact = self.contact_cost(state, self.impact_cost_weight, self.impact_cost_range)
         parts = {"reward_linup": up, "reward_quadctrl": -effort, "reward_impact": -impact}

@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 import tumble
-from tumble.gym.task import columns
+from tumble.gym.task import columns, motor_columns
 
 _Base: Any = object
 with contextlib.suppress(ModuleNotFoundError):  # the interface itself needs nothing of it
@@ -89,9 +89,16 @@ class ParallelEnv(_Base):  # type: ignore[misc]
         self.observation_spaces = {agent: team.observation_space(agent) for agent in self.possible_agents}
         self.action_spaces = {agent: team.action_space(agent) for agent in self.possible_agents}
         self._bodies = {agent: self.world.articulation(agent) for agent in self.possible_agents}
-        self._columns = {agent: _columns(body, team.MOTORS) for agent, body in self._bodies.items()}
+        self._columns = {agent: motor_columns(columns(body), team.MOTORS, repr(body.name)) for agent, body in self._bodies.items()}
         self._start, self._cycles = self.world.save(), 0
         self._rng: np.random.Generator | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key != "_bodies"}  # a body belongs to its world
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bodies = {agent: self.world.articulation(agent) for agent in self.possible_agents}
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Returns the space of an agent's observations."""
@@ -153,13 +160,3 @@ class ParallelEnv(_Base):  # type: ignore[misc]
         torques = np.zeros(self._bodies[agent].dof)
         torques[self._columns[agent]] = np.clip(action, -self.team.REACH, self.team.REACH) * [gear for _, gear in self.team.MOTORS]
         return torques
-
-
-def _columns(body: tumble.Articulation, motors: Sequence[tuple[str, float]]) -> list[int]:
-    """The degree of freedom of each motor."""
-    names = columns(body)
-    missing = [joint for joint, _ in motors if joint not in names]
-    if missing:
-        raise tumble.UnknownNameError(f"{body.name!r} has no joint named {missing[0]!r}")
-    return [names.index(joint) for joint, _ in motors]
-

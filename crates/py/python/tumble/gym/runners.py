@@ -44,11 +44,19 @@ class _Runner(Task):
         return ~self.healthy(state) & self.terminate_when_unhealthy
 
     def reward(self, before: State, state: State, actions: NDArray[np.float64], dt: float) -> tuple[Floats, Infos]:
-        speed = (state.q[:, 0] - before.q[:, 0]) / dt
+        speed = self.velocity(before, state, dt)[:, 0]
         forward, effort = self.forward_reward_weight * speed, self.ctrl_cost_weight * np.square(actions).sum(axis=1)
         alive = self.healthy_reward * self.healthy(state)
         parts = {"reward_forward": forward, "reward_ctrl": -effort, "reward_survive": alive}
         return forward + alive - effort, {**self.reset_info(state), "x_velocity": speed, **parts}
+
+    def place(self, state: State) -> Floats:
+        """Returns the place whose velocity counts, m, shape (n, PLACES)."""
+        return state.q[:, : self.PLACES]
+
+    def velocity(self, before: State, state: State, dt: float) -> Floats:
+        """Returns the mean velocity of ``place`` over a step, m/s, shape (n, PLACES)."""
+        return (self.place(state) - self.place(before)) / dt
 
     def reset_info(self, state: State) -> Infos:
         return {"x_position": state.q[:, 0], "z_distance_from_origin": state.q[:, 1] - self.HEIGHT_M}
@@ -74,8 +82,12 @@ class HopperTask(_Runner):
     """One leg of four links in a plane, to hop along x.
 
     Observation: height, m, angles of torso, thigh, leg and foot, rad, and all six velocities within 10; shape (11,). Action: torques of the three joints
-    in 200 N·m, within 1. Terminated when the torso is below 0.7 m, tilted by 0.2 rad, or a number is above 100.
+    in 200 N·m, within 1. Terminated when the torso's height, m, its tilt, rad, or another position or velocity is not within its range.
     """
+
+    healthy_state_range: tuple[float, float] = (-100.0, 100.0)
+    healthy_z_range: tuple[float, float] = (0.7, float("inf"))
+    healthy_angle_range: tuple[float, float] = (-0.2, 0.2)
 
     MODEL: ClassVar[str] = "hopper.xml"
     MOTORS: ClassVar = (("hip", 200.0), ("knee", 200.0), ("ankle", 200.0))
@@ -85,7 +97,8 @@ class HopperTask(_Runner):
 
     def healthy(self, state: State) -> Flags:
         numbers = np.concatenate([state.q[:, 2:], state.v], axis=1)
-        upright: Flags = (state.q[:, 1] > 0.7) & (np.abs(state.q[:, 2]) < 0.2) & (np.abs(numbers) < 100).all(axis=1)
+        upright: Flags = within(state.q[:, 1], self.healthy_z_range) & within(state.q[:, 2], self.healthy_angle_range)
+        upright &= within(numbers, self.healthy_state_range).all(axis=1)
         return upright
 
 
@@ -94,8 +107,11 @@ class Walker2dTask(_Runner):
     """Two legs in a plane, to walk along x.
 
     Observation: height, m, angles of torso, right and left thigh, leg and foot, rad, and all nine velocities within 10; shape (17,). Action: torques of the
-    six joints in 100 N·m, within 1. Terminated when the torso is below 0.8 m or above 2 m, or tilted by 1 rad.
+    six joints in 100 N·m, within 1. Terminated when the torso's height, m, or its tilt, rad, is not within its range.
     """
+
+    healthy_z_range: tuple[float, float] = (0.8, 2.0)
+    healthy_angle_range: tuple[float, float] = (-1.0, 1.0)
 
     MODEL: ClassVar[str] = "walker2d.xml"
     MOTORS: ClassVar = tuple((f"{joint}_{side}", 100.0) for side in ("right", "left") for joint in ("hip", "knee", "ankle"))
@@ -104,8 +120,7 @@ class Walker2dTask(_Runner):
     HEIGHT_M: ClassVar[float] = 1.25
 
     def healthy(self, state: State) -> Flags:
-        upright: Flags = (state.q[:, 1] > 0.8) & (state.q[:, 1] < 2.0) & (np.abs(state.q[:, 2]) < 1.0)
-        return upright
+        return within(state.q[:, 1], self.healthy_z_range) & within(state.q[:, 2], self.healthy_angle_range)
 
 
 @dataclass
@@ -146,15 +161,19 @@ class AntTask(_Runner):
     """A body with four legs, to walk along x.
 
     Observation: height, m, orientation of the torso (w, x, y, z), eight angles, rad; velocity of the torso, world axes, m/s, angular velocity, its own axes,
-    rad/s, eight rates; then the contact forces on the 13 bodies, each torque about the ant's center of mass and force, world axes, clipped to 1;
+    rad/s, eight rates; then the contact forces on the 13 bodies, each torque about the ant's center of mass and force, world axes, clipped to ``contact_force_range``;
     shape (105,). A leg's first part is fixed to the torso, so its contacts count as the torso's. Action: torques of hip and ankle of each leg in 150 N·m,
-    within 1, in the order of the joints, the last leg first. Terminated when the torso is below 0.2 m or above 1 m. It starts with ankles bent by 1 rad.
+    within 1, in the order of the joints, the last leg first. Terminated when the torso's height, m, is outside its range. It starts with ankles bent by 1 rad.
+    main_body: the body whose velocity counts, by its name in ``BODIES`` or its number there from 1, the torso.
     """
 
     ctrl_cost_weight: float = 0.5
     contact_cost_weight: float = 5e-4
     reset_noise_scale: float = 0.1
     include_cfrc_ext_in_observation: bool = True
+    main_body: int | str = 1
+    healthy_z_range: tuple[float, float] = (0.2, 1.0)
+    contact_force_range: tuple[float, float] = (-1.0, 1.0)
 
     MODEL: ClassVar[str] = "ant.xml"
     KEYFRAME: ClassVar[str] = "standing"
@@ -176,18 +195,32 @@ class AntTask(_Runner):
         return q, v + scale * rng.standard_normal(len(v))
 
     def healthy(self, state: State) -> Flags:
-        upright: Flags = (state.q[:, 2] >= 0.2) & (state.q[:, 2] <= 1.0)
+        low, high = self.healthy_z_range
+        upright: Flags = (state.q[:, 2] >= low) & (state.q[:, 2] <= high)
         return upright
 
     def contact_forces(self, state: State) -> Floats:
         """Returns torques about the center of mass and forces on each body, clipped, shape (n, 13, 6)."""
-        return np.clip(contact_wrenches(state, self.body)[:, self.order], -1, 1)
+        return np.clip(contact_wrenches(state, self.body)[:, self.order], *self.contact_force_range)
 
     def world(self) -> tumble.World:
         world = super().world()
         self.body = world.articulation("torso")
         self.order = [self.body.link_names.index(name) for name in self.BODIES]
         return world
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.main_body not in (*range(1, len(self.BODIES) + 1), *self.BODIES):
+            raise tumble.InvalidValueError(f"main_body is {self.main_body!r}; it must be 1 to {len(self.BODIES)}, or one of {', '.join(self.BODIES)}")
+
+    def place(self, state: State) -> Floats:
+        """Place of the main body, m, shape (n, 2)."""
+        name = self.BODIES[self.main_body - 1] if isinstance(self.main_body, int) else self.main_body
+        if name == self.BODIES[0]:
+            return state.q[:, :2]
+        place: Floats = self.body.link_pose(name, state.q).reshape(-1, 7)[:, :2]
+        return place
 
     def observe(self, state: State) -> Floats:
         first = self.PLACES if self.exclude_current_positions_from_observation else 0
@@ -200,7 +233,7 @@ class AntTask(_Runner):
     def reward(self, before: State, state: State, actions: NDArray[np.float64], dt: float) -> tuple[Floats, Infos]:
         total, info = super().reward(before, state, actions, dt)
         contact = self.contact_cost_weight * np.square(self.contact_forces(state)).reshape(len(state.q), -1).sum(axis=1)
-        return total - contact, {**info, "y_velocity": (state.q[:, 1] - before.q[:, 1]) / dt, "reward_contact": -contact}
+        return total - contact, {**info, "y_velocity": self.velocity(before, state, dt)[:, 1], "reward_contact": -contact}
 
     def reset_info(self, state: State) -> Infos:
         x, y = state.q[:, :2].T
@@ -208,6 +241,12 @@ class AntTask(_Runner):
 
     def camera(self, q: Floats) -> tumble.Camera:
         return tumble.Camera((q[0], q[1] - 4.0, 2.5), (q[0], q[1], 0.3))
+
+
+def within(numbers: Floats, bounds: tuple[float, float]) -> Flags:
+    """Whether numbers are between two others, and equal neither."""
+    inside: Flags = (numbers > bounds[0]) & (numbers < bounds[1])
+    return inside
 
 
 def contact_wrenches(state: State, body: tumble.Articulation) -> Floats:

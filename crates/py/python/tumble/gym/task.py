@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -45,12 +45,16 @@ class State:
         )
 
 
+@dataclass(eq=False)
 class Task:
     """An environment: a model, and observation, reward and end of an episode as functions of arrays with one row for each world.
 
     A subclass is a dataclass whose fields are its parameters, and sets the class variables. Motors are ``(joint, gear)``: an action in
-    ``-reach`` to ``reach`` for each, the torque is gear times action.
+    ``-reach`` to ``reach`` for each, the torque is gear times action. frame_skip: steps of the world for each step of the environment, at least 1; None:
+    ``FRAME_SKIP``. A field whose name ends in ``_range`` is a pair of numbers, the lower one first; another raises ``InvalidValueError``.
     """
+
+    frame_skip: int | None = field(default=None, kw_only=True)
 
     MODEL: ClassVar[str]
     """File of the model: in the folder ``models``, or anything that ``World.load`` opens."""
@@ -59,9 +63,37 @@ class Task:
     MOTORS: ClassVar[Sequence[tuple[str, float]]] = ()
     REACH: ClassVar[float] = 1.0
     FRAME_SKIP: ClassVar[int] = 1
-    """Steps of the world for each step of the environment."""
+    """Steps of the world for each step of the environment, where ``frame_skip`` is None."""
     OBSERVATION: ClassVar[int]
     """Length of an observation."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.steps, (int, np.integer)) or self.steps < 1:
+            raise tumble.InvalidValueError(f"frame_skip is {self.steps!r}; it must be a whole number of at least 1")
+        for each in fields(self):
+            if each.name.endswith("_range"):
+                _check_range(each.name, getattr(self, each.name))
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {name: value for name, value in self.__dict__.items() if not self._is_handle(name)}
+        return kept if len(kept) == len(self.__dict__) else {**kept, "_had_handles": True}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        state = dict(state)
+        had_handles = state.pop("_had_handles", False)
+        self.__dict__.update(state)
+        if had_handles:
+            self.world()  # sets them
+            self.__dict__.update(state)
+
+    def _is_handle(self, name: str) -> bool:
+        """Whether an attribute is no parameter and an articulated body, which belongs to a world that is not pickled along."""
+        return isinstance(self.__dict__[name], tumble.Articulation) and name not in {each.name for each in fields(self)}
+
+    @property
+    def steps(self) -> int:
+        """Steps of the world for each step of the environment."""
+        return self.FRAME_SKIP if self.frame_skip is None else self.frame_skip
 
     def world(self) -> tumble.World:
         """Returns the world of the model."""
@@ -120,11 +152,12 @@ class Runs:
         self.task = task
         world = task.world()
         self.batch = tumble.Batch(world, count, threads=threads)
-        self.dt = world.dt * task.FRAME_SKIP
+        self.dt = world.dt * task.steps
         self.q, self.v = self.batch.q[0].copy(), self.batch.v[0].copy()
-        names = [name for body in world.bodies if isinstance(body, tumble.Articulation) for name in columns(body)]
+        robots = [body for body in world.bodies if isinstance(body, tumble.Articulation)]
+        names = [name for body in robots for name in columns(body)]
         self.controls, self.limit_forces = np.zeros((count, self.batch.dof)), np.zeros(count)
-        self.columns = np.array([names.index(joint) for joint, _ in task.MOTORS], np.int64)
+        self.columns = np.array(motor_columns(names, task.MOTORS, " and ".join(repr(body.name) for body in robots) or "the world"), np.int64)
 
     def reset(self, mask: Flags, rngs: Sequence[np.random.Generator]) -> Infos:
         """Starts new episodes in the worlds of a mask. Returns the infos of all worlds."""
@@ -145,7 +178,7 @@ class Runs:
         before, failed = self.state(), np.zeros(len(mask), np.bool_)
         controls = self.task.controls(actions, self.columns, self.batch.dof)
         try:
-            self.batch.step(controls, self.task.FRAME_SKIP, mask=mask)
+            self.batch.step(controls, self.task.steps, mask=mask)
         except tumble.StepError:
             failed = self.batch.failed
         self.controls[mask] = controls[mask]
@@ -159,6 +192,24 @@ class Runs:
     def observe(self) -> Floats:
         """Returns the observations of all worlds."""
         return self.task.observe(self.state())
+
+
+def _check_range(name: str, given: Any) -> None:
+    try:
+        low, high = given
+        ordered = bool(float(low) <= float(high))
+    except (TypeError, ValueError):
+        ordered = False
+    if not ordered:
+        raise tumble.InvalidValueError(f"{name} is {given!r}; it must be a pair of numbers, the lower one first")
+
+
+def motor_columns(names: Sequence[str], motors: Sequence[tuple[str, float]], owner: str) -> list[int]:
+    """Returns the degree of freedom of each motor. names: the joint of each degree of freedom. owner: whose joints they are, for the error."""
+    for joint, _ in motors:
+        if joint not in names:
+            raise tumble.UnknownNameError(f"{owner} has no joint named {joint!r}; there are {', '.join(dict.fromkeys(names))}")
+    return [names.index(joint) for joint, _ in motors]
 
 
 def columns(body: tumble.Articulation) -> list[str]:
