@@ -51,13 +51,13 @@ table! {
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
     bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fa6178513e41a74b";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "ea0943289d02ada4";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "ebc973fa391aa030";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
     chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";
-    falling_time_stepping: "falling", TimeStepping, "e612a5a33bb789d4", "5a7e24fe006f5bf6";
+    falling_time_stepping: "falling", TimeStepping, "817849ff17bbd44b", "eceefdd6f90fa94d";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "56e2144218680e99", "57e7414b05aa686d";
+    falling_backtracking: "falling", Backtracking, "56e2144218680e99", "40c2283b3f49a702";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -94,7 +94,7 @@ table! {
     arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "17736b4a409409d7";
     walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "6e69fb4e45ddca89";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "dd93b3ba2f28eb55";
-    mechanism_time_stepping: "mechanism", TimeStepping, "693bdfa98885bbc3", "f5e6d678c34b6cf3";
+    mechanism_time_stepping: "mechanism", TimeStepping, "693bdfa98885bbc3", "2c657dfd986eeb83";
     dominoes_time_stepping: "dominoes", TimeStepping, "3e999483436aff8f", "bc6eb97a7494a75e";
 }
 
@@ -106,6 +106,6 @@ table! {
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
     dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
-    mechanism_backtracking: "mechanism", Backtracking, "6b095cfe81cdb322", "d2b76cc6ba303bf6";
+    mechanism_backtracking: "mechanism", Backtracking, "55b50f8bf9644bee", "d778d306bb7046ba";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "be3e16a61a93cd6a", "9121e031bf023833";
 }
