@@ -120,7 +120,7 @@ fn wrong_input_ends_with_2_and_says_what_would_be_right() {
     let (nowhere, here) = (text(&folder.path("nowhere/tree.json")), text(&folder.path("")));
     let bare = folder.write("bare.urdf", "<robot name=\"r\"><link name=\"a\"/></robot>");
     let gone = folder.write("gone.urdf", GONE);
-    let cases: [(&[&str], &str); 24] = [
+    let cases: [(&[&str], &str); 26] = [
         (&[&none], "none.obj: cannot be read"),
         (&[&open], "the mesh is open: 3 edges"),
         (&[&mesh, "--method", "foo"], "unknown method foo, expected one of"),
