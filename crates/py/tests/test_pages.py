@@ -261,7 +261,7 @@ FOREIGN = set(  # of other programs, and of other engines
     "UDisplayClusterPlayerInput cluster_display cluster_operation Documentation troubleshooting unity distortionMap "
     "franka franka_panda panda_collision panda_spherized robot_cfg NV_swap_group PFD_STEREO VK_KHR_present_wait "
     "VK_GOOGLE_display_timing VK_KHR_present_id VK_NV_present_barrier VULKAN_GOOGLE_DISPLAY_TIMING open_with_callback raw_native_swapchain "
-    "set_next_present_time texture_from_raw vkQueuePresentKHR vulkaninfo display_timing MESA_SHADER_CACHE_DIR".split()
+    "set_next_present_time texture_from_raw vkQueuePresentKHR vulkaninfo display_timing MESA_SHADER_CACHE_DIR camera_id camera_name max_geom visual_options".split()
 )
 STAND_INS = set("x1080 RECORDING now_files frame_000042 tumble_UID tumble_UID_ pin_k name_count my_wall ARCHIVE".split())
 
