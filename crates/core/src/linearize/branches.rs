@@ -2,6 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
+/// Gap within which a contact is at a kink when branches are recorded, m.
+pub(crate) const ROUNDING: f64 = 1e-9;
+
 /// A branch at which the map of a step has a kink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -54,6 +57,13 @@ impl Branches {
     pub fn differing(&mut self) -> Option<&[(Switch, Option<usize>)]> {
         let log = self.log.get_mut().unwrap_or_else(PoisonError::into_inner);
         (log.next == log.taken.len()).then_some(&log.differ[..])
+    }
+
+    /// Returns the branch to take where the sign of a number decides, above 0 or not. While branches are recorded, it counts as
+    /// above 0 if it exceeds `rounding`: contacts that rest together are on one side then, whatever the last digits say.
+    pub fn above(&self, switch: Switch, place: Option<usize>, value: f64, rounding: f64) -> bool {
+        let records = self.active && !self.log.lock().unwrap_or_else(PoisonError::into_inner).repeats;
+        self.take(switch, place, value > if records { rounding } else { 0.0 })
     }
 
     /// Returns the branch to take where the numbers say `branch`. `place`: index of the contact, if any.

@@ -8,8 +8,9 @@
 //! presses without friction             w_n = 0,  λ_t = 0
 //! equality; presses; inside bounds     w = 0
 //! at a bound                           λ = bound
+//! both bounds 0                        λ = the bound against w: friction in a direction in which nothing moves yet
 //! sticks                               w_n = 0,  w_t = 0
-//! slides                               w_n = 0,  |w_t|·λ_t + μ·λ_n·w_t = 0
+//! slides                               w_n = 0,  λ_t = μ·λ_n·p/|p|,  p = d·λ_t − w_t
 //! ```
 //!
 //! With `F(λ; rows) = 0` at the known solution `λ₀`, rows that differ by `δ` have the solution
@@ -21,6 +22,7 @@
 //! | symbol | meaning |
 //! |---|---|
 //! | `K`, `R`, `c`, `w` | as in [`rows`](crate::constraint::rows) |
+//! | `d` | mean diagonal of the block of `K + R` |
 //! | `∂F/∂λ` | at the known solution; singular where contacts are redundant (four corners of a box), where the solution nearest to `λ₀` is taken: velocities are the same for all |
 //!
 //! Where a row presses with no force, or slides with no velocity, the derivative is that of one side: the one on which
@@ -33,7 +35,11 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Newton rounds that make the known solution exact.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 12;
+/// Number of lengths of a round that are tried, each half of the last.
+const HALVINGS: i32 = 12;
+/// Maximum number of active sets that are tried for a known solution.
+const SETS: usize = 12;
 /// Least number of rounds with the derivative at the known solution, for displaced rows, and most as long as they converge:
 /// the first one makes the derivative right, the others the truncation of differences small.
 const CHORDS: (usize, usize) = (3, 6);
@@ -51,6 +57,8 @@ enum Active {
     Holds,
     AtLow,
     AtHigh,
+    /// Both bounds are one number, and move apart in displaced rows.
+    Narrow,
     Sticks,
     Slides,
     /// Presses without friction.
@@ -211,15 +219,13 @@ impl<'a> Problem<'a> {
             active[i] = match set {
                 RowSet::Equality => Active::Holds,
                 RowSet::HalfLine if presses(k) => Active::Holds,
+                RowSet::Interval { lo, hi } if d * (hi - lo) <= STILL => Active::Narrow,
                 RowSet::Interval { lo, .. } if d * (lambda[k] - lo) < w[k] - STILL => Active::AtLow,
                 RowSet::Interval { hi, .. } if d * (lambda[k] - hi) > w[k] + STILL => Active::AtHigh,
                 RowSet::Interval { .. } => Active::Holds,
                 RowSet::Cone { mu } if presses(k) && mu > 0.0 => {
-                    let [moved, speed] = [1.0, 0.0].map(|share| {
-                        let along = |k: usize| share * d * lambda[k] - w[k];
-                        hypot(along(k + 1), along(k + 2))
-                    });
-                    let sticks = speed <= STILL || moved <= mu * d * lambda[k];
+                    let wanted = |k: usize| d * lambda[k] - w[k];
+                    let sticks = hypot(wanted(k + 1), wanted(k + 2)) <= mu * d * lambda[k] + STILL;
                     if sticks { Active::Sticks } else { Active::Slides }
                 }
                 RowSet::Cone { .. } if presses(k) => Active::Smooth,
@@ -230,26 +236,78 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the solution near `lambda` exactly, with its active set and the inverse of the derivative.
+    ///
+    /// A solver ends within its tolerance, where a row that presses can look open. So the active set is that of the
+    /// exact solution of its own equations: it is taken anew until that solution is inside it.
     fn know(&self, all: &[f64], tape: &mut Tape) -> Known {
-        let mut lambda: Vec<f64> = self.places.iter().map(|&row| all[row]).collect();
-        let active = self.active(&lambda);
-        let (mut inverse, mut determined) = self.inverse(&active, &lambda);
-        for _ in 0..ROUNDS {
-            let next = self.step(&active, &lambda, &inverse);
-            let (before, after) = (self.error(&active, &lambda), self.error(&active, &next));
-            if after.is_nan() || after >= before {
+        let mut best: Option<(f64, Known, bool)> = None;
+        let mut start: Vec<f64> = self.places.iter().map(|&row| all[row]).collect();
+        for _ in 0..SETS {
+            let active = self.active(&start);
+            if best.as_ref().is_some_and(|(_, best, _)| best.active == active) {
                 break;
             }
-            lambda = next;
-            (inverse, determined) = self.inverse(&active, &lambda);
+            let (lambda, inverse, determined) = self.solution(&active, &start);
+            let mut off = self.residual(&active, &lambda);
+            self.leave(&active, &lambda, |_, _, by| off = if by > STILL { off.max(by) } else { off });
+            start.clone_from(&lambda);
+            if best.as_ref().is_none_or(|(least, ..)| off < *least) {
+                best = Some((off, Known { blocks: self.blocks.to_vec(), active, lambda, inverse }, determined));
+            }
+            if off <= STILL {
+                break;
+            }
         }
-        tape.residual = tape.residual.max(self.error(&active, &lambda));
+        let (off, known, determined) = best.unwrap_or_else(|| {
+            let empty = Known { blocks: Vec::new(), active: Vec::new(), lambda: start, inverse: DMatrix::zeros(0, 0) };
+            (f64::INFINITY, empty, true)
+        });
+        tape.residual = tape.residual.max(off);
         tape.indeterminate |= !determined;
-        Known { blocks: self.blocks.to_vec(), active, lambda, inverse }
+        known
     }
 
-    fn error(&self, active: &[Active], lambda: &[f64]) -> f64 {
-        self.equations(active, lambda).iter().fold(0.0, |most: f64, f| most.max(f.abs()))
+    /// Returns the solution of the equations of an active set near `lambda`, the inverse of their derivative, and whether it
+    /// determines all velocities.
+    fn solution(&self, active: &[Active], lambda: &[f64]) -> (Vec<f64>, DMatrix<f64>, bool) {
+        let mut lambda = lambda.to_vec();
+        let (mut inverse, mut determined) = self.inverse(active, &lambda);
+        for _ in 0..ROUNDS {
+            let (whole, before) = (self.step(active, &lambda, &inverse), self.size(active, &lambda));
+            let part =
+                |share: f64| -> Vec<f64> { lambda.iter().zip(&whole).map(|(a, b)| a + share * (b - a)).collect() };
+            let falls = |next: &Vec<f64>| self.size(active, next) < before;
+            let Some(next) = (0..HALVINGS).map(|k| part(0.5_f64.powi(k))).find(falls) else { break };
+            lambda = next;
+            (inverse, determined) = self.inverse(active, &lambda);
+        }
+        (lambda, inverse, determined)
+    }
+
+    /// Returns the largest error of row velocities, m/s: of sliding contacts that by which friction is not against the velocity.
+    fn residual(&self, active: &[Active], lambda: &[f64]) -> f64 {
+        let (f, w) = (self.equations(active, lambda), self.velocities(lambda));
+        let mut most = 0.0_f64;
+        self.each_block(|i, set, d, k| {
+            let slides = if let (Active::Slides, RowSet::Cone { mu }) = (active[i], set) { Some(mu) } else { None };
+            let (speed, load) = match slides {
+                Some(mu) => (hypot(w[k + 1], w[k + 2]), d * mu * lambda[k]),
+                None => (0.0, 0.0),
+            };
+            for j in k..k + set.rows() {
+                let off = match slides {
+                    Some(_) if j > k => (speed * d * lambda[j] + load * w[j]) / (speed + load).max(STILL),
+                    _ => f[j],
+                };
+                most = most.max(off.abs());
+            }
+        });
+        most
+    }
+
+    /// Returns `|F(λ)|`, which falls along a round.
+    fn size(&self, active: &[Active], lambda: &[f64]) -> f64 {
+        self.equations(active, lambda).iter().map(|f| f * f).sum::<f64>().sqrt()
     }
 
     /// Returns `F(λ)`, in m/s.
@@ -263,10 +321,13 @@ impl<'a> Problem<'a> {
                 (Active::Smooth, _) => (k + 1..k + 3).for_each(|k| f[k] = d * lambda[k]),
                 (Active::AtLow, RowSet::Interval { lo, .. }) => f[k] = d * (lambda[k] - lo),
                 (Active::AtHigh, RowSet::Interval { hi, .. }) => f[k] = d * (lambda[k] - hi),
+                (Active::Narrow, RowSet::Interval { lo, hi }) => {
+                    f[k] = d * (lambda[k] - if f[k] > 0.0 { lo } else { hi });
+                }
                 (Active::Slides, _) => {
-                    let (speed, load) = (hypot(f[k + 1], f[k + 2]), d * mu * lambda[k]);
-                    let scale = 1.0 / (speed + load).max(STILL);
-                    (k + 1..k + 3).for_each(|k| f[k] = scale * (speed * d * lambda[k] + load * f[k]));
+                    let (load, wanted) = (d * mu * lambda[k], [1, 2].map(|t| d * lambda[k + t] - f[k + t]));
+                    let size = hypot(wanted[0], wanted[1]).max(f64::MIN_POSITIVE);
+                    [1, 2].iter().zip(wanted).for_each(|(t, p)| f[k + t] = d * lambda[k + t] - load * p / size);
                 }
                 _ => {}
             }
@@ -286,7 +347,7 @@ impl<'a> Problem<'a> {
             let mu = if let RowSet::Cone { mu } = set { mu } else { 0.0 };
             unit[k..k + set.rows()].fill(1.0 / d.sqrt());
             match active[i] {
-                Active::Open | Active::AtLow | Active::AtHigh | Active::Smooth => {
+                Active::Open | Active::AtLow | Active::AtHigh | Active::Narrow | Active::Smooth => {
                     let first = k + usize::from(active[i] == Active::Smooth);
                     for k in first..k + set.rows() {
                         jacobian.row_mut(k).fill(0.0);
@@ -294,17 +355,20 @@ impl<'a> Problem<'a> {
                     }
                 }
                 Active::Slides => {
-                    let (speed, load) = (hypot(w[k + 1], w[k + 2]), d * mu * lambda[k]);
-                    let scale = 1.0 / (speed + load).max(STILL);
-                    let along = |j: usize| if speed > 0.0 { w[j] / speed } else { 0.0 };
-                    for j in k + 1..k + 3 {
-                        let mut row = load * k_matrix.row(j);
-                        for t in k + 1..k + 3 {
-                            row += d * lambda[j] * along(t) * k_matrix.row(t);
+                    let (load, wanted) = (d * mu * lambda[k], [1, 2].map(|t| d * lambda[k + t] - w[k + t]));
+                    let size = hypot(wanted[0], wanted[1]).max(f64::MIN_POSITIVE);
+                    let along = wanted.map(|p| p / size);
+                    for j in [0, 1] {
+                        let mut row = nalgebra::RowDVector::zeros(n);
+                        for t in [0, 1] {
+                            // of the direction by what is wanted, d·λ_t − w_t
+                            let turn = load / size * (f64::from(u8::from(j == t)) - along[j] * along[t]);
+                            row += turn * k_matrix.row(k + 1 + t);
+                            row[k + 1 + t] -= turn * d;
                         }
-                        row[j] += speed * d;
-                        row[k] += d * mu * w[j];
-                        jacobian.set_row(j, &(scale * row));
+                        row[k + 1 + j] += d;
+                        row[k] -= d * mu * along[j];
+                        jacobian.set_row(k + 1 + j, &row);
                     }
                 }
                 Active::Holds | Active::Sticks => {}
@@ -332,34 +396,40 @@ impl<'a> Problem<'a> {
 
     /// Adds the blocks whose multipliers or velocities leave the active set.
     fn check(&self, active: &[Active], lambda: &[f64], switched: &mut Vec<(Switch, usize)>) {
+        self.leave(active, lambda, |i, switch, by| {
+            if by > STILL {
+                switched.push((switch, self.blocks[i] as usize));
+            }
+        });
+    }
+
+    /// Calls `each` with the blocks that are outside their active set, and by how much, m/s.
+    fn leave(&self, active: &[Active], lambda: &[f64], mut each: impl FnMut(usize, Switch, f64)) {
         let w = self.velocities(lambda);
         self.each_block(|i, set, d, k| {
-            let below = |value: f64| value < -STILL;
-            let switch = match (active[i], set) {
-                (Active::Open, _) if d > 0.0 && below(w[k]) => Some(Switch::Force),
-                (Active::Holds, RowSet::HalfLine) | (Active::Sticks | Active::Slides | Active::Smooth, _)
-                    if below(d * lambda[k]) =>
-                {
-                    Some(Switch::Force)
+            let (switch, inside) = match (active[i], set) {
+                (Active::Open, _) if d > f64::MIN_POSITIVE => (Switch::Force, w[k]),
+                (Active::Holds, RowSet::HalfLine) | (Active::Smooth, _) => (Switch::Force, d * lambda[k]),
+                (Active::Holds, RowSet::Interval { lo, hi }) => {
+                    (Switch::Friction, d * (lambda[k] - lo).min(hi - lambda[k]))
                 }
-                (Active::Holds, RowSet::Interval { lo, hi })
-                    if below(d * (lambda[k] - lo)) || below(d * (hi - lambda[k])) =>
-                {
-                    Some(Switch::Friction)
+                (Active::AtLow, _) => (Switch::Friction, w[k]),
+                (Active::AtHigh, _) => (Switch::Friction, -w[k]),
+                (Active::Sticks | Active::Slides, _) if d * lambda[k] < -STILL => (Switch::Force, d * lambda[k]),
+                (Active::Sticks, RowSet::Cone { mu }) => {
+                    (Switch::Friction, d * (mu * lambda[k] - hypot(lambda[k + 1], lambda[k + 2])))
                 }
-                (Active::AtLow, _) if below(w[k]) => Some(Switch::Friction),
-                (Active::AtHigh, _) if below(-w[k]) => Some(Switch::Friction),
-                (Active::Sticks, RowSet::Cone { mu })
-                    if below(d * (mu * lambda[k] - hypot(lambda[k + 1], lambda[k + 2]))) =>
-                {
-                    Some(Switch::Friction)
+                // friction along the velocity
+                (Active::Slides, _) => {
+                    let along = w[k + 1] * lambda[k + 1] + w[k + 2] * lambda[k + 2];
+                    let speed = hypot(w[k + 1], w[k + 2]);
+                    (Switch::Friction, if along > 0.0 { -d * along / speed - 2.0 * STILL } else { 0.0 })
                 }
-                (Active::Slides, _) if w[k + 1] * lambda[k + 1] + w[k + 2] * lambda[k + 2] > 0.0 => {
-                    Some(Switch::Friction)
-                }
-                _ => None,
+                _ => return,
             };
-            switched.extend(switch.map(|switch| (switch, self.blocks[i] as usize)));
+            if inside < 0.0 {
+                each(i, switch, -inside);
+            }
         });
     }
 

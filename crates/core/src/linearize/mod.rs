@@ -23,8 +23,8 @@
 mod branches;
 mod held_solver;
 
-pub(crate) use branches::Branches;
 pub use branches::Switch;
+pub(crate) use branches::{Branches, ROUNDING};
 
 use crate::solver::{GaussSeidel, RowSolver};
 use crate::step::{Stepper, TimeStepping};

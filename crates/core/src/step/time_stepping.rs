@@ -53,7 +53,7 @@ use crate::contact::pair::{PredictionMode, Reach};
 use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
-use crate::linearize::Switch;
+use crate::linearize::{ROUNDING, Switch};
 use crate::object::Level;
 use crate::object::part_state::PartState;
 use crate::sensor::loads::SubstepForces;
@@ -229,6 +229,7 @@ impl TimeStepping {
         let ends: Option<Vec<f64>> =
             free.change.as_ref().map(|change| u.iter().zip(change).map(|(u, c)| u + c).collect());
         work.rows.add_velocity_on(threads, contacts..blocks, ends.as_deref().unwrap_or(u), &mut work.c);
+        let rounding = ROUNDING / h;
         parts.clear();
         parts.resize(work.contact_constraints.len(), Part::default());
         keep.clear();
@@ -255,11 +256,11 @@ impl TimeStepping {
             // the surface with the mean of both velocities
             let pressed = first[row] - before[row];
             let mean = 2.0 * gap / h + rate;
-            let all = core.branches.take(Switch::Gap, Some(i), mean > pressed);
+            let all = core.branches.above(Switch::Gap, Some(i), mean - pressed, rounding);
             let by_mean = if s > 0.0 { 0.0 } else { [mean, pressed][usize::from(all)] };
-            let later = core.branches.take(Switch::Gap, Some(i), by_mean > gap / left);
+            let later = core.branches.above(Switch::Gap, Some(i), by_mean - gap / left, rounding);
             let reach = if later { by_mean } else { gap / left };
-            let open = core.branches.take(Switch::Gap, Some(i), !struck && reach > 0.0);
+            let open = core.branches.above(Switch::Gap, Some(i), if struck { 0.0 } else { reach }, rounding);
             work.c[row] += if open { reach } else { 0.0 };
         }
         for i in 0..work.contact_constraints.len() {
@@ -280,7 +281,7 @@ impl TimeStepping {
                 continue;
             }
             work.c[block.row as usize] -= 0.5 * h * free.turning_of_row(&work.rows, block, 0);
-            let open = target.set == RowSet::HalfLine && core.branches.take(Switch::Gap, None, target.error > 0.0);
+            let open = target.set == RowSet::HalfLine && core.branches.above(Switch::Gap, None, target.error, ROUNDING);
             let reach = if open { target.error / h } else { 0.0 };
             if reach > 0.0 && work.c[block.row as usize] > -0.5 * reach && target.compliance == 0.0 {
                 far.push(b);

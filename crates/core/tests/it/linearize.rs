@@ -22,7 +22,7 @@ fn exact_world(dt: f64) -> World {
 }
 
 /// The state after a frame from a displaced one, in the coordinates of `LinearizedStep`, from those of `end`.
-fn displaced(world: &World, of: &LinearizedStep, end: &World, column: usize, by: f64) -> DVector<f64> {
+pub fn displaced(world: &World, of: &LinearizedStep, end: &World, column: usize, by: f64) -> DVector<f64> {
     let n = of.b.ncols();
     let mut world = world.fork();
     for (id, range) in of.objects.iter().filter(|(_, range)| range.contains(&(column % n))) {
@@ -194,9 +194,11 @@ fn a_thousand_random_contacts_agree_with_differences() {
         seed += 1;
         let world = random_contact(seed);
         let linear = world.linearize().unwrap();
-        assert!(linear.residual < 1e-11, "seed {seed}: {:.1e}", linear.residual);
+        // at a kink, as where a contact slides at 1e-7 m/s, a solution may be less exact
+        let kink = !(linear.switches.is_empty() && linear.one_sided.is_empty() && linear.across.is_empty());
+        assert!(linear.residual < if kink { 1e-10 } else { 1e-11 }, "seed {seed}: {:.1e}", linear.residual);
         // differences cross a kink there
-        if !(linear.switches.is_empty() && linear.one_sided.is_empty() && linear.across.is_empty()) {
+        if kink {
             kinked += 1;
             continue;
         }

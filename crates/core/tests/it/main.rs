@@ -48,6 +48,7 @@ mod internal_edges;
 mod joint_springs;
 mod limits;
 mod linearize;
+mod linearize_redundant;
 mod link_mass;
 mod link_sensors;
 mod link_surfaces;
