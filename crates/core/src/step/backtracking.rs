@@ -74,6 +74,8 @@ const TRIES: u32 = 200;
 /// Soft forces are implicit rows if any of them changes its own velocity by more than this fraction of
 /// it in the sub-step: explicit integration loses its accuracy there and, at about 2, its stability.
 const STIFF: f64 = 0.5;
+/// A contact that does not last and opens faster has no force, m/s.
+const STILL: f64 = 1e-7;
 /// Least sub-step, as a fraction of the frame.
 const FLOOR: f64 = 1.0 / (1 << 28) as f64;
 /// Shortest sub-step to which the error of contacts that move leads, as a fraction of the frame.
@@ -285,7 +287,8 @@ impl Backtracking {
                 .dot(&constraint.contact.normal);
             let allowed =
                 if lasts || (touching && speed.abs() < SLOW) { s.drift_tolerance } else { s.contact_tolerance };
-            Role { lasts, touching, allowed: allowed.max(-constraint.contact.gap + s.contact_tolerance) }
+            let allowed = allowed.max(-constraint.contact.gap + s.contact_tolerance);
+            Role { lasts, touching, opens: speed >= STILL, allowed }
         };
         self.watch.roles.clear();
         self.watch.roles.extend(self.work.contact_constraints.iter().map(role));

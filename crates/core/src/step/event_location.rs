@@ -22,6 +22,8 @@ pub(super) const SLOW: f64 = 1e-3;
 pub(super) struct Role {
     pub lasts: bool,
     pub touching: bool,
+    /// Whether the gap opens, at the place and with the normal that the contact has now.
+    pub opens: bool,
     /// Depth that does not end the sub-step, m.
     pub allowed: f64,
 }

@@ -239,7 +239,7 @@ impl TimeStepping {
             let (row, candidate) = (block.row as usize, self.candidates.get(i));
             let struck = self.impact[row] > 0.0 || candidate.is_some_and(|candidate| candidate.stops);
             let s = block.sides().iter().map(|side| self.impact_fraction[side.u as usize]).fold(0.0, f64::max);
-            let rate = moving::gap_rate(work, i, &free, (first[row], h)).0;
+            let (rate, turning) = moving::gap_rate(work, i, &free, (first[row], h));
             let closed = h * s * 0.5 * (first[row] + rate);
             let (gap, left) = (constraint.gap_of_row() + closed, h * (1.0 - s).max(1e-9));
             let rest_speed = candidate.map_or(f64::INFINITY, |candidate| candidate.rest_speed);
@@ -255,7 +255,9 @@ impl TimeStepping {
             // without an impact the impulse acts in the middle of the step: what forces bring back in it gets to
             // the surface with the mean of both velocities
             let pressed = first[row] - before[row];
-            let mean = 2.0 * gap / h + rate;
+            // a gap that opens along surfaces that curve away opens faster than that of the planes of its row
+            let curves = rate > 0.0 && !moving::touches(core, constraint, 0.5 * h);
+            let mean = 2.0 * gap / h + rate + if curves { h * turning.max(0.0) } else { 0.0 };
             let all = core.branches.above(Switch::Gap, Some(i), mean - pressed, rounding);
             let by_mean = if s > 0.0 { 0.0 } else { [mean, pressed][usize::from(all)] };
             let later = core.branches.above(Switch::Gap, Some(i), by_mean - gap / left, rounding);

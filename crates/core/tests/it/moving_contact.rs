@@ -80,6 +80,97 @@ fn dome(stepper: &str, dt: f64) -> f64 {
     (world.energy().total() - before) / (0.5 * velocity(&world, id).norm_squared())
 }
 
+/// A ball that is thrown along a fixed dome: it slides or rolls, slides, leaves it and flies. The contact has a radius `L` of
+/// both balls, `θ` is the angle from the top, `N = m·(g·cos θ − L·θ'²)`.
+///
+/// ```text
+/// rolls      7/5·L·θ'' = g·sin θ    until 2/7·m·g·sin θ = μ·N
+/// slides     L·θ'' = g·sin θ − μ·N/m,  ω' = μ·N·r/I    until N = 0
+/// ```
+struct Thrown {
+    friction: f64,
+    /// s
+    until: f64,
+}
+
+impl Thrown {
+    const START: [f64; 2] = [0.2, 0.6];
+    const RADII: [f64; 2] = [1.0, 0.2];
+
+    fn reach() -> f64 {
+        Thrown::RADII[0] + Thrown::RADII[1]
+    }
+
+    /// Rates of `θ`, `θ'`, `ω`, and the margin until the phase ends.
+    fn rates(&self, rolls: bool, [angle, rate, _]: [f64; 3]) -> ([f64; 3], f64) {
+        let (reach, r) = (Thrown::reach(), Thrown::RADII[1]);
+        let normal = G * angle.cos() - reach * rate * rate;
+        if rolls {
+            let a = 5.0 / 7.0 * G * angle.sin();
+            return ([rate, a / reach, a / r], self.friction * normal - 2.0 / 7.0 * G * angle.sin());
+        }
+        let friction = self.friction * normal;
+        ([rate, (G * angle.sin() - friction) / reach, friction / (0.4 * r)], normal)
+    }
+
+    /// Returns the place (x, z), velocity and spin at the end, by steps of the fourth order with located ends of phases.
+    fn exact(&self) -> [f64; 5] {
+        let (reach, spin) = (Thrown::reach(), Thrown::reach() / Thrown::RADII[1] * Thrown::START[1]);
+        let mut y = [Thrown::START[0], Thrown::START[1], if self.friction > 0.0 { spin } else { 0.0 }];
+        let (mut time, mut rolls, mut flies) = (0.0, self.friction > 0.0, false);
+        let step = |y: [f64; 3], rolls: bool, h: f64| {
+            let add = |d: [f64; 3], h: f64| [0, 1, 2].map(|i| y[i] + h * d[i]);
+            let a = self.rates(rolls, y).0;
+            let b = self.rates(rolls, add(a, 0.5 * h)).0;
+            let c = self.rates(rolls, add(b, 0.5 * h)).0;
+            let d = self.rates(rolls, add(c, h)).0;
+            [0, 1, 2].map(|i| y[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
+        };
+        while time < self.until && !flies {
+            let h = f64::min(1e-4, self.until - time);
+            let mut next = (step(y, rolls, h), h);
+            if self.rates(rolls, next.0).1 < 0.0 {
+                let (mut low, mut high) = (0.0, h);
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    let over = self.rates(rolls, step(y, rolls, middle)).1 < 0.0;
+                    if over { high = middle } else { low = middle }
+                }
+                next = (step(y, rolls, high), high);
+                (rolls, flies) = (false, !rolls);
+            }
+            (y, time) = (next.0, time + next.1);
+        }
+        let (left, [s, c]) = (self.until - time, [y[0].sin(), y[0].cos()]);
+        let v = [reach * y[1] * c, -reach * y[1] * s];
+        let fall = [0.0, -0.5 * G * left * left];
+        [reach * s + v[0] * left + fall[0], reach * c + v[1] * left + fall[1], v[0], v[1] - G * left, y[2]]
+    }
+
+    /// Returns the largest error of place, velocity and spin of a stepper.
+    fn error(&self, stepper: &str, dt: f64) -> f64 {
+        let material = Material { friction: self.friction, ..smooth() };
+        let mut world = world(stepper, dt);
+        let [radius, r] = Thrown::RADII;
+        world.add_static(RigidBody::fixed(sphere(radius)).with_name("dome").with_material(material)).unwrap();
+        let ([angle, rate], reach) = (Thrown::START, Thrown::reach());
+        let body = RigidBody::new(sphere(r))
+            .with_mass(1.0)
+            .with_material(material)
+            .with_name("ball")
+            .with_pose(Pose::translation(reach * angle.sin(), 0.0, reach * angle.cos()))
+            .with_velocity(reach * rate * Vec3::new(angle.cos(), 0.0, -angle.sin()))
+            .with_angular_velocity(Vec3::new(0.0, if self.friction > 0.0 { reach * rate / r } else { 0.0 }, 0.0));
+        let id = world.add(body).unwrap();
+        (0..(self.until / dt).round() as usize).for_each(|_| {
+            world.step().unwrap();
+        });
+        let (x, v, w) = (position(&world, id), velocity(&world, id), world.part_state(id, 0).unwrap().angular_velocity);
+        let now = [x.x, x.z, v.x, v.z, w.y];
+        now.iter().zip(self.exact()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+}
+
 /// Relative error of the spin of a ball after an oblique impact on rough ground. An impact that sticks
 /// leaves the contact point at rest and keeps the angular momentum about it: `ω = v/(r·(1 + 2/5))`.
 fn spin_after_impact(stepper: &str, dt: f64, restitution: f64) -> f64 {
@@ -184,6 +275,24 @@ fn a_collision_off_center_keeps_angular_momentum() {
                 let error = two_balls(stepper, 1.0 / hz, restitution);
                 println!("{stepper} at {hz} Hz, {restitution}: {error}");
                 assert!(error < 1e-12, "{stepper} at {hz} Hz, restitution {restitution}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_is_thrown_along_a_dome_slides_rolls_and_leaves_it() {
+    for (friction, until) in [(0.0, 0.4), (0.0, 1.0), (0.3, 0.4), (0.3, 0.55), (0.3, 1.0)] {
+        for (stepper, bounds) in [
+            ("time_stepping", [1e-2, 2e-4, 1.2e-5]),
+            ("backtracking", [4e-3, 2.5e-4, 2.5e-5]),
+            ("dp", [1e-6, 1e-7, 1e-8]),
+        ] {
+            let thrown = Thrown { friction, until };
+            for (hz, bound) in [60.0, 240.0, 960.0].into_iter().zip(bounds) {
+                let error = thrown.error(stepper, 1.0 / hz);
+                println!("{stepper} at {hz} Hz, friction {friction}, {until} s: {error:.2e}");
+                assert!(error < bound, "{stepper} at {hz} Hz, friction {friction}, {until} s: {error}");
             }
         }
     }

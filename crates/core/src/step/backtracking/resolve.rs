@@ -141,7 +141,7 @@ impl Backtracking {
                 work.c[row] = rate + velocity[row] / left;
             }
             work.c[range.start] += constraint.contact.gap.max(0.0) / (left * left);
-            keep[i] = role.touching && (role.lasts || velocity[range.start] < 1e-7);
+            keep[i] = role.touching && (role.lasts || !role.opens);
         }
         let mut adhesion = vec![0.0; core.dof];
         adhere(work, core.settings.drift_tolerance, 1.0, &mut adhesion);
