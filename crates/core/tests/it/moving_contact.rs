@@ -242,7 +242,7 @@ fn a_ball_that_slides_down_a_dome_keeps_its_energy_to_second_order() {
     assert!(errors("backtracking", dome).iter().all(|error| error.abs() < 1e-5));
     let exact = errors("dp", dome);
     assert!(exact.iter().all(|error| error.abs() < 1e-5));
-    assert!(exact[..3].windows(2).all(|pair| pair[0].abs() > 12.0 * pair[1].abs()), "not of fourth order");
+    assert!(exact.windows(2).all(|pair| pair[0].abs() > 12.0 * pair[1].abs()), "not of fourth order");
 }
 
 #[test]

@@ -51,13 +51,13 @@ table! {
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
     bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fa6178513e41a74b";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "ebc973fa391aa030";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "e1022f58f8a5f43a";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
-    chain_backtracking: "chain", Backtracking, "ce89310e8ae40373", "2f0fa6c1c74d74b8";
+    chain_backtracking: "chain", Backtracking, "e95b2c5fd7a05d9c", "209fc1911104a1b4";
     falling_time_stepping: "falling", TimeStepping, "817849ff17bbd44b", "eceefdd6f90fa94d";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "56e2144218680e99", "40c2283b3f49a702";
+    falling_backtracking: "falling", Backtracking, "8b5c954758f04b2b", "dd8295e6e99189ae";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -65,9 +65,9 @@ table! {
     piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
     robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "ab1a03e9bd8ec5bb";
-    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "3eadc1e4cf6cf68e";
-    skeleton_time_stepping: "skeleton", TimeStepping, "e2f709491ea28dc6", "977480983f29d479";
-    skeleton_backtracking: "skeleton", Backtracking, "a5c9e7e222e6da4f", "3878052a4136eb37";
+    robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c622c65d53ec29f0";
+    skeleton_time_stepping: "skeleton", TimeStepping, "e4e23c0c3f5d9795", "aba735043a95bb06";
+    skeleton_backtracking: "skeleton", Backtracking, "234d5163e48e0e96", "228be6bedd425941";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -76,7 +76,7 @@ table! {
 table! {
     [0.5, 2.0];
     ball_machine_time_stepping: "ball_machine", TimeStepping, "5ecf66676422b39a", "6ca07cc8c4dab840";
-    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "e1fbe6c431a91a54";
+    ball_machine_backtracking: "ball_machine", Backtracking, "36e0fde2a34f7dfa", "8bba253f4e158314";
     bird_time_stepping: "bird", TimeStepping, "3d85f0ea42bb77db", "878264a194147426";
     bird_backtracking: "bird", Backtracking, "1ce1e6f8cf5eb25d", "dcde02ee42013d37";
     card_house_time_stepping: "card_house", TimeStepping, "091b9380060ee20c", "8003317c097996db";
@@ -100,12 +100,12 @@ table! {
 
 table! {
     [0.1, 0.3];
-    cloth_time_stepping: "cloth", TimeStepping, "193dfd785230acaf", "bbcac9a19c91cf5a";
-    cloth_backtracking: "cloth", Backtracking, "193dfd785230acaf", "bbcac9a19c91cf5a";
+    cloth_time_stepping: "cloth", TimeStepping, "193dfd785230acaf", "b77a063e154a12ca";
+    cloth_backtracking: "cloth", Backtracking, "193dfd785230acaf", "b77a063e154a12ca";
     jelly_time_stepping: "jelly", TimeStepping, "58432d5e1831dfb4", "6d8fb706aa558611";
     arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
-    dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "65cc4abe74402264";
+    dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "7b6644db6277f1cf";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
-    mechanism_backtracking: "mechanism", Backtracking, "55b50f8bf9644bee", "d778d306bb7046ba";
+    mechanism_backtracking: "mechanism", Backtracking, "4fab6d90e389a76f", "5b7159a9936cb74d";
     wrecking_ball_backtracking: "wrecking_ball", Backtracking, "be3e16a61a93cd6a", "9121e031bf023833";
 }
