@@ -19,8 +19,8 @@ const PICKLED: &[u8; 8] = b"tumbleL1";
 #[pyclass(frozen, module = "tumble")]
 #[derive(Serialize, Deserialize)]
 pub struct LinearizedStep {
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
+    a: Matrix,
+    b: Matrix,
     objects: Vec<(String, usize, usize)>,
     switches: Vec<(String, Option<(String, String)>)>,
     one_sided: Vec<usize>,
@@ -36,6 +36,7 @@ impl LinearizedStep {
         let Core { a, b, objects, switches, one_sided, across, residual, indeterminate } = core;
         let objects = objects.into_iter().map(|(id, range)| (name(id), range.start, range.end)).collect();
         let switches = switches.iter().map(switch).collect();
+        let [a, b] = [&a, &b].map(Matrix::of);
         LinearizedStep { a, b, objects, switches, one_sided, across, residual, indeterminate }
     }
 }
@@ -56,8 +57,21 @@ fn word(switch: Switch) -> &'static str {
     }
 }
 
-fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> Result<Bound<'py, PyArray2<f64>>> {
-    Ok(PyArray1::from_slice(py, m.transpose().as_slice()).reshape([m.nrows(), m.ncols()])?)
+/// A matrix by rows.
+#[derive(Serialize, Deserialize)]
+struct Matrix {
+    shape: [usize; 2],
+    numbers: Vec<f64>,
+}
+
+impl Matrix {
+    fn of(m: &DMatrix<f64>) -> Matrix {
+        Matrix { shape: [m.nrows(), m.ncols()], numbers: m.transpose().as_slice().to_vec() }
+    }
+}
+
+fn matrix<'py>(py: Python<'py>, m: &Matrix) -> Result<Bound<'py, PyArray2<f64>>> {
+    Ok(PyArray1::from_slice(py, &m.numbers).reshape(m.shape)?)
 }
 
 #[pymethods]
@@ -124,7 +138,7 @@ impl LinearizedStep {
     }
 
     fn __repr__(&self) -> String {
-        format!("<tumble.LinearizedStep n={} switches={}>", self.b.ncols(), self.switches.len())
+        format!("<tumble.LinearizedStep n={} switches={}>", self.b.shape[1], self.switches.len())
     }
 }
 
