@@ -87,11 +87,11 @@ mod _native {
     #[pymodule_export]
     use super::world::class::World;
     #[pymodule_export]
-    use super::world::linearize::LinearizedStep;
+    use super::world::linearize::{_unpickle_linearized_step, LinearizedStep};
     #[pymodule_export]
     use super::world::pickling::{_unpickle_shape, _unpickle_world};
     #[pymodule_export]
-    use super::world::report::StepReport;
+    use super::world::report::{_unpickle_step_report, StepReport};
     #[pymodule_export]
     use super::world::simulate::simulate;
 

@@ -44,6 +44,31 @@ def test_gravity_of_a_description_can_be_set(pendulum):
     assert pendulum.forward_dynamics([0.3], [0.0], [0.0])[0] == pytest.approx(-1.62 / 0.5 * np.sin(0.3))
 
 
+def test_a_joint_without_inertia_is_an_error_of_forward_dynamics_too():
+    builder = tumble.ArticulationBuilder("stack")
+    builder.add_link("yaw", axis=(0, 0, 1))
+    builder.add_link("pitch", "yaw", axis=(0, 1, 0))
+    builder.add_link("roll", "pitch", axis=(0, 0, 1), shape=tumble.Box(0.1, 0.2, 0.3), mass=1)
+    stack = builder.build()
+    message = "of row 7 is singular: the joint of link 'yaw' moves no inertia in this pose"
+    q = np.tile([0.1, 0.4, 0.2], (40, 1))
+    for call in (stack.forward_dynamics, stack.forward_dynamics_derivatives):
+        assert np.isfinite(call(q, np.zeros(3), np.ones(3))).all()
+        locked = q.copy()
+        locked[[7, 12], 1] = 0
+        for count in (8, 9, 40):  # in lanes, the last register full or not
+            with pytest.raises(tumble.InvalidValueError, match=message):
+                call(locked[:count], np.zeros(3), np.ones(3))
+        with pytest.raises(tumble.InvalidValueError, match="at the positions is singular: the joint of link 'yaw'"):
+            call([0, 0, 0], np.zeros(3), np.ones(3))
+    # the next neighbor has an acceleration
+    assert stack.mass_matrix([0, 1e-3, 0]) @ stack.forward_dynamics([0, 1e-3, 0], np.zeros(3), [1, 0, 0]) == pytest.approx([1, 0, 0], abs=1e-6)
+    point = tumble.ArticulationBuilder("point")
+    point.add_link("bead", axis=(0, 0, 1), mass=1, center_of_mass=(0, 0, 1), inertia=(0, 0, 0))
+    with pytest.raises(tumble.InvalidValueError, match="the joint of link 'bead' moves no inertia"):
+        point.build().forward_dynamics([0.0], [0.0], [1.0])
+
+
 def random_states(arm, count, seed=1):
     rng = np.random.default_rng(seed)
     return [rng.uniform(-1.5, 1.5, (count, arm.dof)) for _ in range(3)]

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 SHORT = {script for script in (ROOT / "examples").glob("*.py") if len(script.read_text().splitlines()) < 25}  # test_programs.py runs those
 EXAMPLES = sorted({*(ROOT / "examples").glob("*.py")} - SHORT)
-NEEDS = {"cart_pole": "gymnasium", "gym_training": "gymnasium"}
+NEEDS = {"cart_pole": "gymnasium", "gym_training": "gymnasium", "ppo_ant": "stable_baselines3"}
 WORDS = {  # what must stand in the output, beside what each script asserts itself
     "arm_dynamics": "a batch of accelerations: (1000, 6)",
     "bouncing_ball": "off the closed form",
@@ -21,6 +21,7 @@ WORDS = {  # what must stand in the output, beside what each script asserts itse
     "gym_training": "returns of 500 to 500 in new episodes",
     "pin_lock": "and turns the plug by 1.8",
     "pendulum_energy": "period by theory            2.152875 s",
+    "ppo_ant": "Ant after 8192 steps: ",
     "rollout_control": "touched: False",
     "sphere_tree": "level 2: 64 balls",
     "worm_gear": "by theory -0.8378",
@@ -60,6 +61,13 @@ def test_a_hopper_learns_to_stay_up(tmp_path):
     first, *_, last = run([ROOT / "examples" / "gym_training.py", "Hopper", "6", "200"], tmp_path).splitlines()
     untrained, least = float(first.split()[-1]), float(last.split("returns of ")[1].split()[0])
     assert untrained < 70 and least > 2 * untrained
+
+
+def test_an_example_without_its_package_says_so(tmp_path):
+    if importlib.util.find_spec("stable_baselines3") is not None:
+        pytest.skip("SKIPPED: stable-baselines3 is installed")
+    done = subprocess.run([sys.executable, ROOT / "examples" / "ppo_ant.py"], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 1 and "SKIPPED: stable-baselines3 is not installed" in done.stderr
 
 
 def test_the_notebook_runs(tmp_path):

@@ -269,6 +269,29 @@ def test_trees_pickle(tmp_path):
     assert again(tumble.SphereTree.load(tmp_path / "tree.json")).to_json() == tree.to_json()
 
 
+def test_results_of_steps_pickle(root):
+    world = tumble.World.from_scene("stack")
+    world.step(50)
+    fields = [name for name in dir(tumble.StepReport) if not name.startswith("_")]
+    assert len(fields) > 15
+    for other in (again(world.report), copy.deepcopy(world.report), copy.copy(world.report)):
+        assert type(other) is tumble.StepReport
+        assert [getattr(other, name) for name in fields] == [getattr(world.report, name) for name in fields]
+    resting = tumble.World()
+    resting.add_static("floor", tumble.HalfSpace())
+    resting.add_rigid("box", tumble.Box(0.2), mass=1.0, position=(0, 0, 0.1))
+    resting.step(5)
+    step = resting.linearize()
+    fields = [name for name in dir(step) if not name.startswith("_")]
+    for other in (again(step), copy.deepcopy(step)):
+        assert repr(other) == repr(step) and all((x == y).all() for x, y in zip(other, step))
+        assert all(np.array_equal(getattr(other, name), getattr(step, name)) for name in {"A", "B"})
+        assert all(getattr(other, name) == getattr(step, name) for name in set(fields) - {"A", "B"})
+    unpickle, (data,) = step.__reduce__()
+    with pytest.raises(tumble.SnapshotError, match="damaged"):
+        unpickle(data[:-1])
+
+
 def test_recordings_pickle(tmp_path):
     world = with_every_shape()
     with tumble.Recorder(tmp_path / "run.mcap") as recorder:

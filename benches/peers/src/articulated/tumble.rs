@@ -70,7 +70,7 @@ impl Single {
 
     /// Computes `q̈`.
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
-        forward_dynamics(&mut self.dynamics, &GRAVITY, q, v, tau, qdd);
+        forward_dynamics(&mut self.dynamics, &GRAVITY, q, v, tau, qdd).expect("the joints of the models meet inertia");
     }
 }
 
@@ -139,6 +139,6 @@ impl<const N: usize> Batch<N> {
 
     /// Computes `q̈` of all lanes.
     pub fn forward_dynamics(&mut self) {
-        self.dynamics.forward_dynamics(&GRAVITY, &self.q, &self.v, &self.tau, &mut self.qdd);
+        self.dynamics.forward_dynamics(&GRAVITY, &self.q, &self.v, &self.tau, &mut self.qdd).expect("the joints of the models meet inertia");
     }
 }

@@ -24,6 +24,7 @@ pub use algorithms::energy::{center_of_mass, energy, momentum};
 pub use algorithms::jacobian::{link_jacobian, point_jacobian};
 pub use algorithms::kinematics::{Kinematics, LinkMotion, Rates};
 pub use algorithms::rnea::{InverseDynamics, inverse_dynamics};
+pub use algorithms::singular::SingularJoint;
 pub use body::{ArticulatedBody, ArticulatedError};
 pub use builder::ArticulationBuilder;
 pub use builder_error::ArticulationError;

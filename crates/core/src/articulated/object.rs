@@ -156,12 +156,7 @@ impl Integratable for ArticulatedBody {
     }
 
     fn singularity(&self, cache: &mut Cache) -> Option<String> {
-        let link = &self.model.links()[cache.get::<BodyCache>().dynamics.singular()?];
-        Some(format!(
-            "the joint of link '{}' moves no inertia in this pose (gimbal lock of stacked joints, or a point mass on the axis); \
-             a spherical joint instead of the stack has no such pose",
-            link.name
-        ))
+        Some(self.model.singularity(cache.get::<BodyCache>().dynamics.singular()?))
     }
 
     fn accelerations(&self, cache: &mut Cache, _x: &[f64], dp: &[f64], part_states: &mut [PartState]) {

@@ -4,7 +4,7 @@ use crate::abm_reference::{
     Kinds, Numbers, bias, drift, jacobian, mass_matrix, moved, poses, random_state, random_tree,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
-use tumble_core::articulated::{Dynamics, forward_dynamics};
+use tumble_core::articulated::{BatchDynamics, Dynamics, Lanes, SingularJoint, forward_dynamics};
 use tumble_core::collide::{Mat3, Pose, Vec3};
 use tumble_core::{Joint, LinkMass, Model, ModelBuilder, Wrench};
 
@@ -67,7 +67,7 @@ fn one_pass_agrees_with_refresh_and_accelerate() {
         let gravity = Vec3::new(0.3, -0.2, -9.81);
         let (mut a, mut b) = (vec![0.0; d.dof()], vec![0.0; d.dof()]);
         d.accelerate_in(&mut d.scratch(), &gravity, &tau, &[], &mut a);
-        forward_dynamics(&mut d.clone(), &gravity, &q, &v, &tau, &mut b);
+        forward_dynamics(&mut d.clone(), &gravity, &q, &v, &tau, &mut b).unwrap();
         let size = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-11 * size), "{} links", d.links());
     }
@@ -219,7 +219,7 @@ fn a_rod_swings_as_the_closed_form_says() {
     let mut d = Dynamics::new(&model);
     for q in [-2.5, -0.3, 0.0, 0.7, 3.0] {
         let mut qdd = [0.0];
-        forward_dynamics(&mut d, &Vec3::new(0.0, 0.0, -9.81), &[q], &[5.0], &[0.0], &mut qdd);
+        forward_dynamics(&mut d, &Vec3::new(0.0, 0.0, -9.81), &[q], &[5.0], &[0.0], &mut qdd).unwrap();
         assert!((qdd[0] + 1.5 * 9.81 / length * f64::sin(q)).abs() < 1e-12, "{q}: {qdd:?}");
     }
 }
@@ -240,7 +240,8 @@ fn a_free_top_obeys_euler() {
         &v,
         &[0.0; 6],
         &mut qdd,
-    );
+    )
+    .unwrap();
     let wanted = -omega.cross(&moments.component_mul(&omega)).component_div(&moments);
     assert!((Vec3::new(qdd[0], qdd[1], qdd[2]) - wanted).norm() < 1e-14);
     assert!((Vec3::new(qdd[3], qdd[4], qdd[5]) + Vec3::z()).norm() < 1e-14);
@@ -277,6 +278,37 @@ fn gimbal_lock_is_named_and_finite() {
         d.point_response(2, &Vec3::x(), &[Vec3::y()], 1.0, &mut y);
         assert!(qdd.iter().chain(&u).chain(&y).chain(&w).all(|x| x.is_finite()), "{pitch}: {qdd:?} {u:?} {y:?}");
     }
+}
+
+/// Forward dynamics does not pass a state without accelerations: one state, and any lane of a batch in SIMD or not.
+#[test]
+fn forward_dynamics_names_the_joint_that_moves_no_inertia() {
+    let model = gimbal();
+    let lock = std::f64::consts::FRAC_PI_2;
+    let mut d = Dynamics::new(&model);
+    for (pitch, held) in [(0.4, None), (lock, Some(SingularJoint { lane: 0, link: 0 }))] {
+        let found = forward_dynamics(&mut d, &-Vec3::z(), &[0.3, pitch, 0.1], &[0.0; 3], &[1.0; 3], &mut [0.0; 3]);
+        assert_eq!(found.err(), held);
+    }
+    for mut batch in [BatchDynamics::<8>::new(&model), BatchDynamics::<8>::plain(&model)] {
+        for locked in [&[][..], &[0], &[5], &[7], &[6, 3]] {
+            let pitches = Lanes(std::array::from_fn(|lane| if locked.contains(&lane) { lock } else { 0.1 }));
+            let (q, ones) = ([Lanes([0.3; 8]), pitches, Lanes([0.1; 8])], [Lanes([1.0; 8]); 3]);
+            let found = batch.forward_dynamics(&-Vec3::z(), &q, &ones, &ones, &mut [Lanes([0.0; 8]); 3]);
+            assert_eq!(found.err(), locked.iter().min().map(|lane| SingularJoint { lane: *lane, link: 0 }));
+        }
+    }
+    let mut builder = ModelBuilder::new();
+    let swing = LinkMass::point(2.0, Vec3::new(0.5, 0.0, 0.0));
+    builder.link("arm", None, Joint::revolute(Vec3::y()), Pose::identity(), swing);
+    let bead = LinkMass::point(1.0, Vec3::new(0.0, 0.0, 0.2));
+    builder.link("bead", Some(0), Joint::revolute(Vec3::z()), Pose::identity(), bead);
+    let model = builder.build().unwrap();
+    let found =
+        forward_dynamics(&mut Dynamics::new(&model), &-Vec3::z(), &[0.0; 2], &[0.0; 2], &[1.0; 2], &mut [0.0; 2]);
+    let held = found.unwrap_err();
+    assert_eq!(held.link, 1);
+    assert!(model.singularity(held.link).contains("the joint of link 'bead' moves no inertia"));
 }
 
 #[test]

@@ -79,7 +79,7 @@ fn all_algorithms_have_the_same_armature() {
         let tau = random.numbers(n, 5.0);
         let (mut qdd, mut once, mut back) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         d.accelerate_in(&mut s, &GRAVITY, &tau, &[], &mut qdd);
-        forward_dynamics(&mut d, &GRAVITY, &q, &v, &tau, &mut once);
+        forward_dynamics(&mut d, &GRAVITY, &q, &v, &tau, &mut once).unwrap();
         assert_eq!(once, qdd);
         let mut kin = Kinematics::new(&model);
         kin.refresh(&model, &q, &v);
@@ -110,11 +110,11 @@ fn lanes_have_the_bits_of_one_state() {
     let v = lanes(model.dof(), &|lane, k| states[lane].1[k]);
     let tau = lanes(model.dof(), &|lane, k| (lane * k) as f64 * 0.1);
     let mut qdd = lanes(model.dof(), &|_, _| 0.0);
-    batch.forward_dynamics(&GRAVITY, &q, &v, &tau, &mut qdd);
+    batch.forward_dynamics(&GRAVITY, &q, &v, &tau, &mut qdd).unwrap();
     let mut d = Dynamics::new(&model);
     for (lane, (q, v)) in states.iter().enumerate() {
         let (tau, mut one): (Vec<f64>, _) = (tau.iter().map(|t| t.0[lane]).collect(), vec![0.0; model.dof()]);
-        forward_dynamics(&mut d, &GRAVITY, q, v, &tau, &mut one);
+        forward_dynamics(&mut d, &GRAVITY, q, v, &tau, &mut one).unwrap();
         assert_eq!(one, qdd.iter().map(|a| a.0[lane]).collect::<Vec<_>>());
     }
 }
@@ -139,7 +139,7 @@ fn a_pendulum_with_a_rotor_swings_as_its_closed_form_and_keeps_its_energy() {
     let (m, l, g, a) = (1.5, 0.8, 9.81, 0.4);
     let (model, inertia) = (pendulum(a), 1.5 * 0.64 / 3.0 + 0.4);
     let mut qdd = [0.0];
-    forward_dynamics(&mut Dynamics::new(&model), &Vec3::new(0.0, 0.0, -g), &[0.7], &[1.3], &[0.2], &mut qdd);
+    forward_dynamics(&mut Dynamics::new(&model), &Vec3::new(0.0, 0.0, -g), &[0.7], &[1.3], &[0.2], &mut qdd).unwrap();
     assert!((qdd[0] - (0.2 - 0.5 * m * g * l * f64::sin(0.7)) / inertia).abs() < 1e-12);
 
     // A small swing: half a period is π·√(I/(½mgl)).
@@ -183,14 +183,15 @@ fn a_top_with_a_rotor_turns_as_its_closed_form_and_keeps_its_energy() {
     let expected = (about_joint + nalgebra::Matrix3::identity() * a).try_inverse().unwrap() * moment;
     let alone = top(a, false);
     let mut qdd = [0.0; 3];
-    forward_dynamics(&mut Dynamics::new(&alone), &GRAVITY, q.as_slice(), v.as_slice(), tau.as_slice(), &mut qdd);
+    forward_dynamics(&mut Dynamics::new(&alone), &GRAVITY, q.as_slice(), v.as_slice(), tau.as_slice(), &mut qdd)
+        .unwrap();
     assert!((Vec3::from(qdd) - expected).norm() < 1e-12, "{qdd:?}, expected {expected}");
 
     let chain = top(a, true);
     let (mut both, still) = ([0.0; 6], [0.0, 0.0, 0.0, 1.0]);
     let (q, v, tau) =
         ([&still[..], q.as_slice()].concat(), [&[0.0; 3], v.as_slice()].concat(), [&[0.0; 3], tau.as_slice()].concat());
-    forward_dynamics(&mut Dynamics::new(&chain), &GRAVITY, &q, &v, &tau, &mut both);
+    forward_dynamics(&mut Dynamics::new(&chain), &GRAVITY, &q, &v, &tau, &mut both).unwrap();
     assert!((Vec3::from_column_slice(&both[3..]) - expected).norm() < 1e-9, "{both:?}, expected {expected}");
 
     let drift = [1e-3, 5e-4].map(|dt| {
@@ -219,7 +220,7 @@ fn a_massless_link_may_have_an_armature_and_other_joints_not() {
     };
     let model = make(Joint::revolute(Vec3::z()), LinkMass::none(), 0.5).unwrap();
     let mut qdd = [0.0];
-    forward_dynamics(&mut Dynamics::new(&model), &GRAVITY, &[0.3], &[2.0], &[3.0], &mut qdd);
+    forward_dynamics(&mut Dynamics::new(&model), &GRAVITY, &[0.3], &[2.0], &[3.0], &mut qdd).unwrap();
     assert_eq!(qdd, [6.0]);
     let ball = LinkMass::point(1.0, Vec3::x());
     for (joint, armature) in [(Joint::Spherical, -0.1), (Joint::revolute(Vec3::z()), -1.0), (Joint::Floating, 0.1)] {

@@ -84,7 +84,9 @@ __all__ = [
     "_unpickle_articulation",
     "_unpickle_batch",
     "_unpickle_built_articulation",
+    "_unpickle_linearized_step",
     "_unpickle_shape",
+    "_unpickle_step_report",
     "_unpickle_tree",
     "_unpickle_world",
     "read_recording",
@@ -1934,7 +1936,8 @@ class Articulation:
         (batch, dof).
 
         q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
-        current values.
+        current values. A singular mass matrix raises ``InvalidValueError`` with the name of the link whose joint
+        moves no inertia.
         """
     def inverse_dynamics(
         self, q: ArrayLike | None = None, qd: ArrayLike | None = None, qdd: ArrayLike | None = None
@@ -3585,6 +3588,8 @@ def _unpickle_batch(
     """Returns the batch of a pickle."""
 def _unpickle_built_articulation(data: bytes, numbers: Sequence[Sequence[float]]) -> Articulation:
     """Unpickles a description of a body made by a program."""
+def _unpickle_linearized_step(data: bytes) -> LinearizedStep:
+    """Returns the linearized step of a pickle."""
 def _unpickle_shape(data: bytes) -> Shape:
     """Returns the object of its class that a pickled shape becomes."""
 @final
@@ -3599,6 +3604,8 @@ class _WindowFeed:
 
 def _show_window() -> None:
     """Shows the messages of stdin in a window until it is closed or they end."""
+def _unpickle_step_report(data: bytes) -> StepReport:
+    """Returns the report of a pickle."""
 def _unpickle_tree(data: bytes) -> SphereTree:
     """Unpickles a sphere tree."""
 def _unpickle_world(data: bytes) -> World:

@@ -323,7 +323,8 @@ impl Articulation {
     /// (batch, dof).
     ///
     /// q: (nq,), qd, tau: (dof,), each optionally batched (batch, …). Omitted arguments have their
-    /// current values.
+    /// current values. A singular mass matrix raises ``InvalidValueError`` with the name of the link whose joint
+    /// moves no inertia.
     #[pyo3(signature = (q=None, qd=None, tau=None, **unknown), text_signature = "($self, q=None, qd=None, tau=None)")]
     fn forward_dynamics<'py>(
         &self,

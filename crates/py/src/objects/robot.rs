@@ -180,13 +180,16 @@ impl Robot {
     pub fn forward_dynamics(&self, gravity: &Vec3, rows: &mut Rows) -> Result<Vec<f64>> {
         rows.settle(&self.model)?;
         let (rows, model, dof) = (&*rows, &self.model, self.dof());
-        caught(|| {
+        let out = caught(|| {
             if rows.count() < LANES {
                 return rows.each(
                     dof,
                     || Dynamics::new(model),
                     |d, k, qdd| {
-                        forward_dynamics(d, gravity, rows.row(0, k), rows.row(1, k), rows.row(2, k), qdd);
+                        let [q, v, tau] = [0, 1, 2].map(|argument| rows.row(argument, k));
+                        if forward_dynamics(d, gravity, q, v, tau, qdd).is_err() {
+                            qdd.fill(f64::NAN);
+                        }
                     },
                 );
             }
@@ -205,12 +208,32 @@ impl Robot {
                         to.iter_mut().zip(rows.row(argument, k)).for_each(|(to, x)| to.0[lane] = *x);
                     }
                 }
-                batch.forward_dynamics(gravity, q, v, tau, qdd);
+                let held = batch.forward_dynamics(gravity, q, v, tau, qdd).err().map(|held| held.lane);
                 for (lane, out) in out.chunks_exact_mut(dof).enumerate() {
                     out.iter_mut().zip(&*qdd).for_each(|(out, x)| *out = x.0[lane]);
+                    if held == Some(lane) {
+                        out.fill(f64::NAN);
+                    }
                 }
             })
-        })
+        })?;
+        self.regular(rows, out, dof)
+    }
+
+    /// Refuses results of `width` numbers per row if a row that begins with NaN has a singular mass matrix.
+    fn regular(&self, rows: &Rows, out: Vec<f64>, width: usize) -> Result<Vec<f64>> {
+        let failed = (0..).zip(out.chunks(width.max(1))).filter(|(_, row)| row[0].is_nan()).map(|(k, _)| k);
+        let still = vec![0.0; self.dof()];
+        let mut dynamics = Dynamics::new(&self.model);
+        for k in failed {
+            dynamics.refresh(rows.row(0, k), &still);
+            if let Some(link) = dynamics.singular() {
+                let of = rows.batch.map_or(String::new(), |_| format!(" of row {k}"));
+                let why = self.model.singularity(link);
+                return Err(Error::value(format!("the mass matrix at the positions{of} is singular: {why}")));
+            }
+        }
+        Ok(out)
     }
 
     /// Returns `tau` from `q`, `qd`, `qdd`.
@@ -249,18 +272,24 @@ impl Robot {
         let out = caught(|| {
             rows.each(
                 width,
-                || Kinematics::new(model),
-                |kin, k, out| {
+                || (Kinematics::new(model), Dynamics::new(model)),
+                |(kin, dynamics), k, out| {
                     let [q, v, tau] = [0, 1, 2].map(|argument| rows.row(argument, k));
-                    match forward_dynamics_derivatives(model, kin, gravity, q, v, tau) {
+                    // the same poses count as singular as in forward dynamics
+                    dynamics.refresh(q, v);
+                    let regular = dynamics.singular().is_none();
+                    match regular.then(|| forward_dynamics_derivatives(model, kin, gravity, q, v, tau)).flatten() {
                         Some(d) => by_rows([&d.by_q, &d.by_v, &d.by_tau], out),
                         None => out.fill(f64::NAN),
                     }
                 },
             )
         })?;
+        let out = self.regular(rows, out, width)?;
         match out.chunks(width.max(1)).position(|row| row[0].is_nan()) {
-            Some(row) => Err(Error::value(format!("the mass matrix at the positions of row {row} is singular"))),
+            Some(row) => Err(Error::value(format!(
+                "the mass matrix at the positions of row {row} is singular to working precision"
+            ))),
             None => Ok(out),
         }
     }

@@ -9,6 +9,7 @@ use crate::interrupt::abandonable;
 use crate::keywords::{self, Unknown};
 use crate::objects::shapes::triangles;
 use crate::pool;
+use crate::world::pickling::pickled;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -19,7 +20,7 @@ use tumble::collide::{
     Builder, CachedTree, LevelQuality, LevelSphere, MeshId, QualitySettings, SphereTree as Tree, TreeCache, TreeFile,
     TreeSettings, TriMesh,
 };
-use tumble::dynamics::archive::{open, seal};
+use tumble::dynamics::archive::open;
 
 /// Nested spheres around a closed mesh. Every sphere contains those of its children, and the
 /// spheres of each level cover the surface.
@@ -273,8 +274,7 @@ impl SphereTree {
     fn __reduce__<'py>(&self, py: Python<'py>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let quality = self.quality.get().cloned().unwrap_or_default();
         let json = TreeFile { quality, ..self.file.clone() }.to_json();
-        let unpickle = py.import("tumble._native")?.getattr("_unpickle_tree")?;
-        Ok((unpickle, (PyBytes::new(py, &seal(PICKLED, &(json, &self.mesh))?),)))
+        pickled(py, "_unpickle_tree", PICKLED, &(json, &self.mesh))
     }
 
     /// Number of levels.

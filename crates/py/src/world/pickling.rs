@@ -9,6 +9,7 @@ use crate::objects::shapes::Shape;
 use crate::world::inner::Inner;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tumble::collide::{Pose, Shape as Solid};
@@ -138,6 +139,17 @@ pub struct ShapeRecord {
 /// The bytes of a shape.
 pub fn write_shape(record: &ShapeRecord) -> Result<Vec<u8>> {
     Ok(seal(SHAPE, record)?)
+}
+
+/// Returns what `__reduce__` of a value does: the function of this module that reads it, and its bytes.
+pub fn pickled<'py>(
+    py: Python<'py>,
+    unpickle: &str,
+    head: &[u8; 8],
+    value: &impl Serialize,
+) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+    let unpickle = py.import("tumble._native")?.getattr(unpickle)?;
+    Ok((unpickle, (PyBytes::new(py, &seal(head, value)?),)))
 }
 
 /// Returns the object of its class that a pickled shape becomes.

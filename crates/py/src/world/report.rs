@@ -1,10 +1,20 @@
 //! Statistics of the last step.
 
+use crate::errors::Result;
+use crate::world::pickling::pickled;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use tumble::dynamics::archive::open;
 use tumble::dynamics::{StepReport as Core, World};
+
+/// The first bytes of a pickle. The number is raised with every change of the fields.
+const PICKLED: &[u8; 8] = b"tumbleR1";
 
 /// Statistics of one step; see ``World.report``.
 #[pyclass(frozen, get_all, module = "tumble")]
+#[derive(Serialize, Deserialize)]
 pub struct StepReport {
     /// Committed sub-steps.
     substeps: u32,
@@ -105,10 +115,20 @@ impl StepReport {
 
 #[pymethods]
 impl StepReport {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Result<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        pickled(py, "_unpickle_step_report", PICKLED, self)
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "<tumble.StepReport contacts={} residual={:.1e} m/s unconverged={} max_penetration={:.1e} m>",
             self.contacts, self.residual, self.unconverged, self.max_penetration
         )
     }
+}
+
+/// Returns the report of a pickle.
+#[pyfunction]
+pub fn _unpickle_step_report(data: PyBackedBytes) -> Result<StepReport> {
+    Ok(open(PICKLED, &data)?)
 }

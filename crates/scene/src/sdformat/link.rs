@@ -172,13 +172,14 @@ fn read_geometry(geometry: &Element<'_, '_>, collidable: bool, context: &mut Con
     Some((Geometry::Shape(shape), Pose::identity()))
 }
 
+/// Friction of a collision without `mu`, as the specification says.
+const DEFAULT_MU: f64 = 1.0;
+
 /// Reads friction and restitution of `<surface>`, and the color of `<material>`.
 fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     let mut surface = context.options.surface.clone();
-    let mu = part.child("surface").and_then(|s| s.child("friction")?.child("ode")?.child("mu"));
-    if part.tag() == "collision" && mu.is_none() && surface.contact.friction == Material::default().friction {
-        let text = format!("without `mu`: its friction is {} here, and 1 in SDFormat", surface.contact.friction);
-        note(part, &text, &mut context.notes);
+    if part.tag() == "collision" && surface.contact.friction == Material::default().friction {
+        surface.contact.friction = DEFAULT_MU;
     }
     if let Some(given) = part.child("surface") {
         note_others(&given, &["friction", "bounce"], &mut context.notes);

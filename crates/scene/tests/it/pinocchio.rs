@@ -94,7 +94,7 @@ fn answers(model: &Model, state: &State) -> Vec<(&'static str, Vec<f64>)> {
     let dof = model.dof();
     let (mut kin, mut work) = (Kinematics::new(model), InverseDynamics::new(model));
     let (mut qdd, mut tau, mut mass) = (vec![f64::NAN; dof], vec![f64::NAN; dof], vec![f64::NAN; dof * dof]);
-    forward_dynamics(&mut Dynamics::new(model), &GRAVITY, &state.q, &state.v, &state.t, &mut qdd);
+    forward_dynamics(&mut Dynamics::new(model), &GRAVITY, &state.q, &state.v, &state.t, &mut qdd).unwrap();
     inverse_dynamics(model, (&mut kin, &mut work), &GRAVITY, &state.q, &state.v, &state.a, &[], &mut tau);
     MassMatrix::new(model).write(model, &kin, &mut mass);
     let (e, p) = (energy(model, &kin, &GRAVITY), momentum(model, &kin));

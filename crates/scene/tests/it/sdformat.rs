@@ -153,6 +153,28 @@ fn universal_and_ball_joints_are_their_axes() {
     assert!((&m - expected).amax() < 1e-12, "{m}");
 }
 
+/// The default of `mu` in the specification is 1; options that state a friction replace it.
+#[test]
+fn a_collision_without_mu_has_a_friction_of_one() {
+    let text = |surface: &str| {
+        let collision = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry>";
+        format!(
+            "<sdf version='1.8'><model name='m'><link name='l'>{collision}{surface}</collision></link></model></sdf>"
+        )
+    };
+    let friction = |surface: &str, own: Option<f64>| {
+        let mut options = UrdfOptions::default();
+        own.iter().for_each(|own| options.surface.contact.friction = *own);
+        let scene = parse(&text(surface), "m.sdf", &options).unwrap_or_else(|error| panic!("{error}"));
+        assert!(!scene.notes.iter().any(|note| note.contains("mu")), "{:?}", scene.notes);
+        scene.articulated[0].links[0].shapes[0].surface.contact.friction
+    };
+    let given = "<surface><friction><ode><mu>0.3</mu></ode></friction></surface>";
+    let bounce = "<surface><bounce><restitution_coefficient>0.2</restitution_coefficient></bounce></surface>";
+    assert_eq!([friction("", None), friction(bounce, None), friction("<surface/>", None)], [1.0; 3]);
+    assert_eq!([friction(given, None), friction(given, Some(0.7)), friction("", Some(0.7))], [0.3, 0.3, 0.7]);
+}
+
 /// A box of a world falls on the static plane and comes to rest half its size above it.
 #[test]
 fn a_world_has_its_gravity_models_and_floor() {

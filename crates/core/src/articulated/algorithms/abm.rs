@@ -274,6 +274,23 @@ impl<T: Scalar> Sweep<T> {
         self.spread(compiled, out);
     }
 
+    /// Passes `1/D` of every joint axis, which is 0 of one that meets no inertia, with the number of its link, in
+    /// ascending order. Needs folded inertias.
+    #[inline(always)]
+    pub fn inverses(&self, compiled: &Compiled, mut to: impl FnMut(usize, T)) {
+        for (i, body) in compiled.bodies.iter().enumerate() {
+            match body.kind {
+                JointKind::Revolute | JointKind::Prismatic => to(i, self.slots[i + 1].inverse),
+                JointKind::Spherical(block) => self.blocks[block].first.inverses(|x| to(i, x)),
+                JointKind::Floating(block) => {
+                    let JointFactor { first, second, .. } = &self.blocks[block];
+                    first.inverses(|x| to(i, x));
+                    second.inverses(|x| to(i, x));
+                }
+            }
+        }
+    }
+
     /// Sweeps accelerations outward, from the world's `Â`. Writes `q̈` to `out`.
     #[inline(always)]
     pub fn spread(&mut self, compiled: &Compiled, mut out: impl FnMut(usize, T)) {

@@ -3,6 +3,7 @@
 //! calls.
 
 use crate::articulated::algorithms::abm::{Input, Slot, Sweep, push, spread, three, write_three};
+use crate::articulated::algorithms::singular::SingularJoint;
 use crate::articulated::model::Model;
 use crate::articulated::model::compiled::{Compiled, CompiledLink, JointKind};
 use crate::articulated::simd::joint_sin_cos::JointSinCos;
@@ -295,11 +296,29 @@ fn carried(body: &CompiledLink, slot: &Slot<f64>, parent: Motion, v: &[f64]) -> 
 
 /// Writes `q̈` from `q`, `v` and joint forces `tau` in uniform gravity, in one pass. Afterwards the
 /// maps of `d` need a [`Dynamics::refresh`].
-pub fn forward_dynamics(d: &mut Dynamics, gravity: &Vec3, q: &[f64], v: &[f64], tau: &[f64], qdd: &mut [f64]) {
+///
+/// # Errors
+/// [`SingularJoint`] if the mass matrix is singular, with the first link that [`Dynamics::singular`] returns. `qdd`
+/// is then that with the axes held that meet no inertia.
+pub fn forward_dynamics(
+    d: &mut Dynamics,
+    gravity: &Vec3,
+    q: &[f64],
+    v: &[f64],
+    tau: &[f64],
+    qdd: &mut [f64],
+) -> Result<(), SingularJoint> {
     d.at.clear();
     let Dynamics { compiled, sweep, joint_sin_cos, .. } = d;
     let turns = joint_sin_cos.take(q);
     sweep.run(compiled, gravity, &SingleState { turns, q, v, tau }, |k, x| qdd[k] = x);
+    let mut held = None;
+    sweep.inverses(compiled, |link, inverse| {
+        if inverse == 0.0 && held.is_none() {
+            held = Some(SingularJoint { lane: 0, link });
+        }
+    });
+    held.map_or(Ok(()), Err)
 }
 
 /// Returns whether numbers have the same bits.

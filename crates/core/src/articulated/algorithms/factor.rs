@@ -39,6 +39,14 @@ impl<T: Scalar> Factor<T> {
         Factor { l: [yx, zx, zy], pivots: Vector::new(a.xx, dy, dz), inverse, root: none, inverse_root: none }
     }
 
+    /// Passes the reciprocals of the three pivots.
+    #[inline(always)]
+    pub fn inverses(&self, mut to: impl FnMut(T)) {
+        to(self.inverse.x);
+        to(self.inverse.y);
+        to(self.inverse.z);
+    }
+
     /// `l⁻¹ x`.
     #[inline(always)]
     pub fn forward(&self, x: Vector<T>) -> Vector<T> {

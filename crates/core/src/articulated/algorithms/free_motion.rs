@@ -235,7 +235,7 @@ mod tests {
             let mut middle = x.clone();
             for (from, h) in [(x.clone(), 0.5 * h), (Vec::new(), h)] {
                 let at = if from.is_empty() { middle.clone() } else { from };
-                forward_dynamics(&mut dynamics, &Vec3::zeros(), &at[..n], &at[n..], &zeros, &mut a);
+                forward_dynamics(&mut dynamics, &Vec3::zeros(), &at[..n], &at[n..], &zeros, &mut a).unwrap();
                 middle.copy_from_slice(&x);
                 step(model, &mut middle, &at[n..], &a, h);
             }

@@ -12,4 +12,5 @@ pub(in crate::articulated) mod jacobian;
 pub(in crate::articulated) mod kinematics;
 pub(in crate::articulated) mod rnea;
 pub(in crate::articulated) mod same_place;
+pub(in crate::articulated) mod singular;
 pub(in crate::articulated) mod whiten;

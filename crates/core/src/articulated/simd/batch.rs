@@ -5,6 +5,7 @@
 //! state, on every processor. Processors differ only in the number of lanes per instruction.
 
 use crate::articulated::algorithms::abm::{Input, Sweep};
+use crate::articulated::algorithms::singular::SingularJoint;
 use crate::articulated::model::Model;
 use crate::articulated::model::compiled::Compiled;
 #[cfg(target_arch = "x86_64")]
@@ -45,8 +46,11 @@ impl<const N: usize> BatchDynamics<N> {
     }
 
     /// Writes `q̈` of every lane for its `q`, `v` and joint forces `tau`, in uniform gravity, m/s².
-    /// Lengths are `positions` and `dof` of the model, with one state per lane. A singular joint
-    /// axis is held, as [`Dynamics::singular`](crate::articulated::Dynamics::singular) says.
+    /// Lengths are `positions` and `dof` of the model, with one state per lane.
+    ///
+    /// # Errors
+    /// [`SingularJoint`] if the mass matrix of a lane is singular: the first lane, and its first link. All of `qdd` is
+    /// written, with the axes held that meet no inertia.
     pub fn forward_dynamics(
         &mut self,
         gravity: &Vec3,
@@ -54,7 +58,7 @@ impl<const N: usize> BatchDynamics<N> {
         v: &[Lanes<N>],
         tau: &[Lanes<N>],
         qdd: &mut [Lanes<N>],
-    ) {
+    ) -> Result<(), SingularJoint> {
         let call = Call { compiled: &self.compiled, gravity, q, v, tau, qdd };
         match &mut self.width {
             SimdWidth::One(sweep) => call.run((), sweep),
@@ -95,13 +99,23 @@ struct Call<'a, const N: usize> {
 impl<const N: usize> Call<'_, N> {
     /// Computes one register of lanes after the other.
     #[inline(always)]
-    fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) {
+    fn run<T: Register>(self, token: T::Token, sweep: &mut Sweep<T>) -> Result<(), SingularJoint> {
         let Call { compiled, gravity, q, v, tau, qdd } = self;
+        let mut held: Option<SingularJoint> = None;
         for first in (0..N).step_by(T::LANES) {
             sweep.run(compiled, gravity, &LaneInput::<T, N> { token, first, q, v, tau }, |k, x| {
                 x.store(&mut qdd[k].0[first..])
             });
+            sweep.inverses(compiled, |link, inverse| {
+                let mut lanes = [1.0; N];
+                inverse.store(&mut lanes[first..]);
+                let at = lanes.iter().position(|x| *x == 0.0);
+                if let Some(lane) = at.filter(|lane| held.is_none_or(|held| *lane < held.lane)) {
+                    held = Some(SingularJoint { lane, link });
+                }
+            });
         }
+        held.map_or(Ok(()), Err)
     }
 }
 
@@ -143,9 +157,9 @@ struct VectorizedCall<'a, T: Register, const N: usize> {
 
 #[cfg(target_arch = "x86_64")]
 impl<T: Register, const N: usize> pulp::NullaryFnOnce for VectorizedCall<'_, T, N> {
-    type Output = ();
+    type Output = Result<(), SingularJoint>;
     #[inline(always)]
-    fn call(self) {
-        self.call.run(self.token, self.sweep);
+    fn call(self) -> Self::Output {
+        self.call.run(self.token, self.sweep)
     }
 }
