@@ -269,8 +269,8 @@ def test_trees_pickle(tmp_path):
     assert again(tumble.SphereTree.load(tmp_path / "tree.json")).to_json() == tree.to_json()
 
 
-def test_results_of_steps_pickle(root):
-    world = tumble.World.from_scene("stack")
+def test_results_of_steps_pickle():
+    world = tumble.World.load("billiards")
     world.step(50)
     fields = [name for name in dir(tumble.StepReport) if not name.startswith("_")]
     assert len(fields) > 15
