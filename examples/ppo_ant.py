@@ -47,14 +47,16 @@ class Worlds(VecEnv):
         raise NotImplementedError("the worlds share their attributes")
 
     def env_method(self, method_name, *args, indices=None, **kwargs):
-        return [getattr(self.env, method_name)(*args, **kwargs)]  # of all worlds at once
+        raise NotImplementedError("the worlds are one environment, `env`")
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         return [False] * len(list(self._get_indices(indices)))
 
 
 if __name__ == "__main__":
-    task, steps = sys.argv[1:3] if len(sys.argv) > 2 else ("Ant", 8192)
+    if len(sys.argv) not in (1, 3):
+        sys.exit("usage: python examples/ppo_ant.py [TASK STEPS]")
+    task, steps = sys.argv[1:] or ("Ant", 8192)
     model = PPO("MlpPolicy", VecMonitor(Worlds(task, 16)), n_steps=128, batch_size=256, seed=0, device="cpu").learn(int(steps))
     ends = [episode["r"] for episode in model.ep_info_buffer]
     print(f"{task} after {model.num_timesteps} steps: {len(ends)} episodes, mean return {np.mean(ends):.0f}")
