@@ -54,9 +54,7 @@ class Worlds(VecEnv):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (1, 3):
-        sys.exit("usage: python examples/ppo_ant.py [TASK STEPS]")
-    task, steps = sys.argv[1:] or ("Ant", 8192)
+    task, steps = sys.argv[1:] if len(sys.argv) == 3 else ("Ant", 8192)
     model = PPO("MlpPolicy", VecMonitor(Worlds(task, 16)), n_steps=128, batch_size=256, seed=0, device="cpu").learn(int(steps))
     ends = [episode["r"] for episode in model.ep_info_buffer]
     print(f"{task} after {model.num_timesteps} steps: {len(ends)} episodes, mean return {np.mean(ends):.0f}")
