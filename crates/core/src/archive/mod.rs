@@ -2,7 +2,7 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | `tumbleAK`; the last is the number of the format | 8 |
+//! | `tumbleAL`; the last is the number of the format | 8 |
 //! | XXH3 of the rest, little-endian | 8 |
 //! | settings, stepper, solver, shapes, visual meshes, objects, pairs, state, contacts, report in postcard | any |
 //!
@@ -47,7 +47,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// First bytes of an archive of a world. The last is the number of the format, which rises with
 /// every change of the content.
-const HEAD: &[u8; 8] = b"tumbleAK";
+const HEAD: &[u8; 8] = b"tumbleAL";
 
 /// Why an archive cannot be written or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

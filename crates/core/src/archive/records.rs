@@ -245,6 +245,8 @@ pub(super) struct PairRecord {
     pub sides: [PairSideRecord; 2],
     restitution: Option<f64>,
     friction: Option<f64>,
+    rolling_friction: Option<f64>,
+    torsional_friction: Option<f64>,
     collides: Option<bool>,
 }
 
@@ -258,10 +260,10 @@ impl PairRecord {
                 PairSide::Material(material) => PairSideRecord::Material(material),
             })
         };
-        let PairMaterial { restitution, friction, collides } = *material;
+        let PairMaterial { restitution, friction, rolling_friction, torsional_friction, collides } = *material;
         let mut sides = [side(sides[0])?, side(sides[1])?];
         sides.sort_unstable();
-        Some(PairRecord { sides, restitution, friction, collides })
+        Some(PairRecord { sides, restitution, friction, rolling_friction, torsional_friction, collides })
     }
 
     /// Adds the pair to a world with these objects.
@@ -271,11 +273,9 @@ impl PairRecord {
             PairSideRecord::Object(index) => PairSide::Object(id(ids, Some(index))),
             PairSideRecord::Material(material) => PairSide::Material(material),
         });
-        world.set_pair_material(
-            a,
-            b,
-            PairMaterial { restitution: self.restitution, friction: self.friction, collides: self.collides },
-        )
+        let PairRecord { restitution, friction, rolling_friction, torsional_friction, collides, .. } = self;
+        let material = PairMaterial { restitution, friction, rolling_friction, torsional_friction, collides };
+        world.set_pair_material(a, b, material)
     }
 }
 

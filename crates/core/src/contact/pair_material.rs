@@ -36,13 +36,17 @@ pub struct PairMaterial {
     pub restitution: Option<f64>,
     /// Coefficient of Coulomb friction, at least 0.
     pub friction: Option<f64>,
+    /// Coefficient of rolling friction, m, at least 0.
+    pub rolling_friction: Option<f64>,
+    /// Coefficient of torsional friction, m, at least 0.
+    pub torsional_friction: Option<f64>,
     /// Whether the two collide at all; `None`: if their groups and masks allow it. A pair that does
     /// not collide is not seen by sensors of the pair either. `true` does not override the groups.
     pub collides: Option<bool>,
 }
 
 impl PairMaterial {
-    /// Checks both ranges.
+    /// Checks all ranges.
     pub(crate) fn validate(&self) -> Result<(), SettingsError> {
         let check = |what, value: Option<f64>, most: f64, expected| match value {
             Some(value) if !(value.is_finite() && (0.0..=most).contains(&value)) => {
@@ -51,7 +55,9 @@ impl PairMaterial {
             _ => Ok(()),
         };
         check("restitution of a pair", self.restitution, 1.0, "0 to 1")?;
-        check("friction of a pair", self.friction, f64::MAX, "finite and at least 0")
+        check("friction of a pair", self.friction, f64::MAX, "finite and at least 0")?;
+        check("rolling friction of a pair", self.rolling_friction, f64::MAX, "finite and at least 0")?;
+        check("torsional friction of a pair", self.torsional_friction, f64::MAX, "finite and at least 0")
     }
 }
 
@@ -116,8 +122,8 @@ impl PairMaterials {
             friction: chosen.friction.unwrap_or_else(|| rule(settings.combine_friction, |m| m.friction)),
             static_friction: chosen.friction.unwrap_or_else(at_rest),
             stribeck_speed: larger(|m| m.stribeck_speed),
-            rolling_friction: larger(|m| m.rolling_friction),
-            torsional_friction: larger(|m| m.torsional_friction),
+            rolling_friction: chosen.rolling_friction.unwrap_or_else(|| larger(|m| m.rolling_friction)),
+            torsional_friction: chosen.torsional_friction.unwrap_or_else(|| larger(|m| m.torsional_friction)),
             tangential_restitution: larger(|m| m.tangential_restitution),
             adhesion: larger(|m| m.adhesion),
             ..Material::default()
@@ -153,6 +159,8 @@ impl PairMaterials {
         PairMaterial {
             restitution: found().find_map(|entry| entry.restitution),
             friction: found().find_map(|entry| entry.friction),
+            rolling_friction: found().find_map(|entry| entry.rolling_friction),
+            torsional_friction: found().find_map(|entry| entry.torsional_friction),
             collides: found().find_map(|entry| entry.collides),
         }
     }

@@ -6,10 +6,10 @@ use crate::object::Material;
 use crate::world::view::ObjectId;
 
 impl World {
-    /// Sets restitution and friction for the contacts of two sides, from the next step on: two
+    /// Sets restitution and the frictions for the contacts of two sides, from the next step on: two
     /// objects, two parts `(id, part)`, or two materials ([`PairSide::Material`]), in any order. A
     /// part takes precedence over its object, an object over its material. A constant that is
-    /// `None` follows the rule of [`Settings`](crate::Settings); both `None` remove the pair. Forks
+    /// `None` follows the rule of [`Settings`](crate::Settings); a pair whose constants are all `None` is removed. Forks
     /// have the same pairs; like materials they are not in [`save`](World::save). Removing an
     /// object removes its pairs.
     ///
@@ -35,7 +35,7 @@ impl World {
         self.core.pair_materials.iter()
     }
 
-    /// Returns restitution and friction of contacts between these two parts.
+    /// Returns restitution, frictions and the other constants of contacts between these two parts.
     ///
     /// # Errors
     /// [`WorldError`]: an object that was removed, or a part that it does not have.

@@ -57,7 +57,11 @@ fn everything(stepper: &str) -> World {
     chain.couple(Coupling { dof: 5, of: 1, multiplier: 0.5, offset: 0.1 }).unwrap();
     world.add(chain).unwrap();
     world
-        .set_pair_material(ids[2], ids[0], PairMaterial { restitution: Some(0.7), friction: Some(0.1), collides: None })
+        .set_pair_material(
+            ids[2],
+            ids[0],
+            PairMaterial { restitution: Some(0.7), friction: Some(0.1), ..PairMaterial::default() },
+        )
         .unwrap();
     world
         .set_pair_material(

@@ -14,7 +14,7 @@ fn surface(material: Material) -> RigidBody {
 /// A ball of 1 kg that touches the plane z = 0, which has the material.
 fn ball_on(stepper: &str, dt: f64, material: Material, body: impl FnOnce(RigidBody) -> RigidBody) -> (World, ObjectId) {
     let mut world = world(stepper, dt);
-    world.add_static(surface(material)).unwrap();
+    world.add_static(surface(material).with_name("floor")).unwrap();
     let ball = RigidBody::new(sphere(RADIUS)).with_mass(1.0);
     let ball = ball.with_material(Material { friction: material.friction, ..Material::default() });
     let id = world.add(body(ball.with_pose(Pose::translation(0.0, 0.0, RADIUS)))).unwrap();
@@ -51,6 +51,40 @@ fn a_rolling_ball_stops_where_rolling_friction_says() {
             }
         }
     }
+}
+
+/// The frictions of a pair hold instead of the larger ones of both surfaces, also where they are smaller.
+#[test]
+fn a_pair_has_a_rolling_and_a_torsional_friction_of_its_own() {
+    let (rho, patch) = (0.005, 0.002);
+    for (pair, rolling, torsional) in [(true, rho, patch), (false, 4.0 * rho, 0.0)] {
+        let material = Material { rolling_friction: 4.0 * rho, ..Material::default() };
+        for (v, omega) in [(Vec3::x(), Vec3::y() / RADIUS), (Vec3::zeros(), 3.0 * Vec3::z())] {
+            let moving = |ball: RigidBody| ball.with_velocity(v).with_angular_velocity(omega);
+            let (mut world, id) = ball_on("time_stepping", 1.0 / 240.0, material, moving);
+            let own = PairMaterial {
+                rolling_friction: Some(rho),
+                torsional_friction: Some(patch),
+                ..PairMaterial::default()
+            };
+            let floor = world.find("floor").unwrap();
+            if pair {
+                world.set_pair_material(floor, id, own).unwrap();
+            }
+            assert_eq!(run(&mut world, 0.1), 0);
+            let slowed = (v - velocity(&world, id)).norm() / 0.1;
+            let braked = (3.0 - spin(&world, id).z) / 0.1 * 0.4 * RADIUS * RADIUS;
+            let (expected, found) = match v == Vec3::zeros() {
+                true => (torsional * G, braked),
+                false => (5.0 / 7.0 * rolling / RADIUS * G, slowed),
+            };
+            assert!((found - expected).abs() < 1e-9, "{pair}, {v}: {found} for {expected}");
+        }
+    }
+    let (mut world, id) = ball_on("time_stepping", 1.0 / 240.0, Material::default(), |ball| ball);
+    let wrong = PairMaterial { rolling_friction: Some(-0.1), ..PairMaterial::default() };
+    let error = world.set_pair_material(id, id, wrong).unwrap_err().to_string();
+    assert!(error.contains("rolling friction of a pair") && error.contains("-0.1"), "{error}");
 }
 
 /// A ball on a slope rests if `tan θ < ρ/r`, else rolls with 5/7·(sin θ − ρ/r·cos θ)·g.

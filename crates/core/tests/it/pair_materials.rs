@@ -92,7 +92,7 @@ fn parts_go_before_objects_and_objects_before_materials() {
     let (mut world, ball, floor) = dropped(Settings::default(), 0.3, 0.1);
     world.get_mut::<RigidBody>(ball).unwrap().material.id = 7;
     world.get_mut::<RigidBody>(floor).unwrap().material.id = 9;
-    let both = |restitution, friction| PairMaterial { restitution, friction, collides: None };
+    let both = |restitution, friction| PairMaterial { restitution, friction, ..PairMaterial::default() };
     let found = |world: &World| {
         let found = world.pair_material((ball, 0), (floor, 0)).unwrap();
         (found.restitution, found.friction)

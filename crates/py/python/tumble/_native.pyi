@@ -2725,13 +2725,15 @@ class World:
         *,
         restitution: float | None = None,
         friction: float | None = None,
+        rolling_friction: float | None = None,
+        torsional_friction: float | None = None,
         collides: bool | None = None,
     ) -> None:
-        """Sets restitution and friction of the contacts of two bodies from the next step on,
+        """Sets restitution and the frictions of the contacts of two bodies from the next step on,
         overriding the combination rules, and whether they collide at all.
 
         a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
-        with the links fixed to it. None keeps the rule; without all the pair has no constants of
+        with the links fixed to it. rolling_friction, torsional_friction: m, at least 0. None keeps the rule; without all the pair has no constants of
         its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
         include materials.
         """

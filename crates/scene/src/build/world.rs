@@ -167,7 +167,8 @@ impl SceneFile {
 
     fn add_pair(&self, spec: &PairSpec, world: &mut World) -> Result<(), WorldError> {
         let [a, b] = spec.sides.map(|side| self.sides(world, side));
-        let material = PairMaterial { restitution: spec.restitution, friction: spec.friction, collides: spec.collides };
+        let PairSpec { restitution, friction, rolling_friction, torsional_friction, collides, .. } = *spec;
+        let material = PairMaterial { restitution, friction, rolling_friction, torsional_friction, collides };
         for (a, b) in a.iter().flat_map(|a| b.iter().map(move |b| (*a, *b))) {
             world.set_pair_material(a, b, material)?;
         }

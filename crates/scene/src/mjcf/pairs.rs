@@ -20,6 +20,16 @@ const MAX_PAIRS: usize = 100_000;
 /// Friction of a pair that gives fewer numbers: two sliding, one torsional (m), two rolling (m).
 const PAIR_FRICTION: [f64; 5] = [1.0, 1.0, 0.005, 0.0001, 0.0001];
 
+/// Frictions of a pair; `None` where those of its geoms hold.
+#[derive(Clone, Copy, Default)]
+struct PairFriction {
+    sliding: Option<f64>,
+    /// m.
+    rolling: Option<f64>,
+    /// m.
+    torsional: Option<f64>,
+}
+
 /// Reads all pairs and exclusions.
 pub(super) fn read<'a>(root: &XmlNode<'a>, assembly: &mut Assembly<'_, 'a>) {
     let notes = &assembly.reader.notes;
@@ -50,7 +60,7 @@ fn exclude(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
         _ => {
             let sides = [a, b].map(|body| sides_of(body, assembly));
             for (first, second) in sides[0].iter().flat_map(|a| sides[1].iter().map(move |b| (*a, *b))) {
-                add(element, assembly, [first, second], None, false);
+                add(element, assembly, [first, second], PairFriction::default(), false);
             }
         }
     }
@@ -94,8 +104,8 @@ fn pair(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
     add(element, assembly, [a, b], friction, true);
 }
 
-/// Returns the sliding friction of a pair; `None` if that of its geoms holds.
-fn read_friction(item: &Item<'_>, geoms: [&Geom<'_>; 2], assembly: &Assembly<'_, '_>) -> Option<f64> {
+/// Returns the frictions of a pair.
+fn read_friction(item: &Item<'_>, geoms: [&Geom<'_>; 2], assembly: &Assembly<'_, '_>) -> PairFriction {
     let notes = &assembly.reader.notes;
     let condim = item.number("condim", Bound::ANY, 3.0);
     let given = item.list("friction", 5).map(|list| list.into_iter().map(|x| x.clamp(0.0, 100.0)).collect::<Vec<_>>());
@@ -112,13 +122,19 @@ fn read_friction(item: &Item<'_>, geoms: [&Geom<'_>; 2], assembly: &Assembly<'_,
     let torsional = if condim > 3.0 { wanted(2, 1) } else { 0.0 };
     let rolling = if condim > 4.0 { [wanted(3, 2), wanted(4, 2)] } else { [0.0; 2] };
     let held = |of: fn(&Material) -> f64| of(&surfaces[0]).max(of(&surfaces[1]));
-    if torsional != held(|m| m.torsional_friction) || rolling != [held(|m| m.rolling_friction); 2] {
-        notes.add(item.own(), "torsional and rolling friction of a pair are left out: those of its geoms hold");
+    if rolling[1] != rolling[0] {
+        notes.add(item.own(), "the second rolling friction of a pair is left out: the first holds in all directions");
     }
-    match condim {
+    let sliding = match condim {
         _ if condim <= 1.0 => Some(0.0),
         _ if geoms.iter().all(|geom| geom.dimensions <= 1.0) => Some(wanted(0, 0)),
-        _ => given.map(|list| list[0]),
+        _ => given.as_ref().map(|list| list[0]),
+    };
+    let own = |value: f64, held: f64| (value != held).then_some(value);
+    PairFriction {
+        sliding,
+        rolling: own(rolling[0], held(|m| m.rolling_friction)),
+        torsional: own(torsional, held(|m| m.torsional_friction)),
     }
 }
 
@@ -163,7 +179,7 @@ fn add(
     element: &Element<'_, '_>,
     assembly: &mut Assembly<'_, '_>,
     mut sides: [PairSideSpec; 2],
-    friction: Option<f64>,
+    friction: PairFriction,
     collides: bool,
 ) {
     sides.sort_unstable();
@@ -173,5 +189,12 @@ fn add(
     if assembly.scene.pairs.len() >= MAX_PAIRS {
         return assembly.reader.notes.add(element, format!("pairs after the first {MAX_PAIRS} are left out"));
     }
-    assembly.scene.pairs.push(PairSpec { sides, restitution: None, friction, collides: Some(collides) });
+    let PairFriction { sliding, rolling, torsional } = friction;
+    assembly.scene.pairs.push(PairSpec {
+        friction: sliding,
+        rolling_friction: rolling,
+        torsional_friction: torsional,
+        collides: Some(collides),
+        ..PairSpec::new(sides)
+    });
 }

@@ -112,7 +112,7 @@ impl Groups {
         let (contact, appearance) = (Material { friction: 0.0, ..Material::default() }, AppearanceSpec::default());
         let material = MaterialSpec { name: "frictionless".into(), contact, sound: None, appearance };
         let sides = [PairSideSpec::Material(FRICTIONLESS); 2];
-        let pair = PairSpec { sides, restitution: None, friction: Some(0.0), collides: None };
+        let pair = PairSpec { friction: Some(0.0), ..PairSpec::new(sides) };
         self.mixed.then_some((material, pair))
     }
 

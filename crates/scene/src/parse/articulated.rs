@@ -367,6 +367,7 @@ fn read_options(f: &mut Fields<'_>, from: &Inherited<'_, '_>, place: &Place<'_>)
         collision_meshes: f.choice_or("collision_meshes", COLLISION, CollisionMeshes::Exact),
         surface: from.surface.clone(),
         recolor: f.value("color").is_some() || f.value("material").is_some(),
+        friction_given: f.value("friction").is_some() || f.value("material").is_some(),
         velocity_limits: false,
     }
 }

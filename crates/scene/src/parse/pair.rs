@@ -1,9 +1,10 @@
-//! `[[pair]]`: restitution and friction of two bodies or two materials, which override the
+//! `[[pair]]`: restitution and frictions of two bodies or two materials, which override the
 //! combination rules of `[world]`, and whether they collide.
 
 use std::collections::BTreeMap;
 
 use crate::parse::body::Library;
+use crate::parse::bound::Bound;
 use crate::parse::fields::{Fields, Value};
 use crate::parse::loop_joint::{PartSpec, Parts};
 use crate::parse::material::{FRICTION, RESTITUTION};
@@ -31,11 +32,21 @@ pub struct PairSpec {
     pub restitution: Option<f64>,
     /// 0 to 100; `None` for the combination rule.
     pub friction: Option<f64>,
+    /// m, at least 0; `None` for the larger one of both surfaces.
+    pub rolling_friction: Option<f64>,
+    /// m, at least 0; `None` for the larger one of both surfaces.
+    pub torsional_friction: Option<f64>,
     /// Whether the two collide; `None` if their groups decide.
     pub collides: Option<bool>,
 }
 
 impl PairSpec {
+    /// Returns a pair without constants of its own.
+    pub fn new(sides: [PairSideSpec; 2]) -> PairSpec {
+        let (rolling_friction, torsional_friction) = (None, None);
+        PairSpec { sides, restitution: None, friction: None, rolling_friction, torsional_friction, collides: None }
+    }
+
     /// Reads a pair. Returns `None`, with the problem recorded, if a side is unknown. `lines` has
     /// the line of each earlier pair.
     pub(crate) fn read(
@@ -50,9 +61,13 @@ impl PairSpec {
         };
         let restitution = f.optional_number("restitution", RESTITUTION);
         let friction = f.optional_number("friction", FRICTION);
+        let rolling_friction = f.optional_number("rolling_friction_m", Bound::NOT_NEGATIVE);
+        let torsional_friction = f.optional_number("torsional_friction_m", Bound::NOT_NEGATIVE);
         let collides = f.value("collides").is_some().then(|| f.flag_or("collides", true));
-        if restitution.is_none() && friction.is_none() && collides.is_none() {
-            f.missing("friction", "`restitution`, `friction`, `collides` or several of them");
+        let numbers = [restitution, friction, rolling_friction, torsional_friction];
+        if numbers.iter().all(Option::is_none) && collides.is_none() {
+            let expected = "`restitution`, `friction`, `rolling_friction_m`, `torsional_friction_m`, `collides` or several of them";
+            f.missing("friction", expected);
         }
         let (log, what, span) = (f.log, f.what.clone(), f.span.clone());
         f.finish();
@@ -62,7 +77,7 @@ impl PairSpec {
             let message = format!("{what} names the same two as the pair at line {line}");
             log.report(span, message, "expected each pair once");
         }
-        Some(PairSpec { sides, restitution, friction, collides })
+        Some(PairSpec { sides, restitution, friction, rolling_friction, torsional_friction, collides })
     }
 }
 

@@ -151,7 +151,7 @@ impl Writer<'_> {
         let world = self.world;
         let mut written = BTreeSet::new();
         for ([a, b], material) in world.pair_materials() {
-            let PairMaterial { restitution, friction, collides } = *material;
+            let PairMaterial { restitution, friction, rolling_friction, torsional_friction, collides } = *material;
             let mut t = Table::default();
             match (self.material_name(a), self.material_name(b)) {
                 (Some(a), Some(b)) => t.put("materials", [a, b]),
@@ -169,6 +169,8 @@ impl Writer<'_> {
             }
             restitution.iter().for_each(|x| t.put("restitution", *x));
             friction.iter().for_each(|x| t.put("friction", *x));
+            rolling_friction.iter().for_each(|x| t.put("rolling_friction_m", *x));
+            torsional_friction.iter().for_each(|x| t.put("torsional_friction_m", *x));
             collides.iter().for_each(|x| t.put("collides", *x));
             let text = t.under("[[pair]]");
             // links with several shapes have a pair for each

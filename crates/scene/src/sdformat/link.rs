@@ -1,7 +1,6 @@
 //! `<link>`: mass, collision shapes and visuals.
 
 use nalgebra::Isometry3;
-use tumble_core::Material;
 use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 
@@ -178,7 +177,7 @@ const DEFAULT_MU: f64 = 1.0;
 /// Reads friction and restitution of `<surface>`, and the color of `<material>`.
 fn read_surface(part: &Element<'_, '_>, context: &mut Context<'_>) -> Surface {
     let mut surface = context.options.surface.clone();
-    if part.tag() == "collision" && surface.contact.friction == Material::default().friction {
+    if part.tag() == "collision" && !context.options.friction_given {
         surface.contact.friction = DEFAULT_MU;
     }
     if let Some(given) = part.child("surface") {

@@ -42,6 +42,8 @@ pub struct UrdfOptions {
     pub surface: Surface,
     /// Whether the appearance of `surface` replaces the file's colors.
     pub recolor: bool,
+    /// Whether the friction of `surface` holds for collisions of SDFormat without `mu`, which is 1 by that format otherwise.
+    pub friction_given: bool,
     /// Whether the velocities in `<limit>` are [enforced](tumble_core::DofSettings::max_velocity). Default `false`: in URDF they bound the
     /// commands of a controller, while an enforced one also holds against gravity and blows. Effort bounds drives in either case.
     pub velocity_limits: bool,

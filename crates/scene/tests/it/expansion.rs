@@ -96,7 +96,7 @@ fn pairs_of_bodies_and_of_materials_have_constants_of_their_own() {
         )
     };
     let pairs = "[[pair]]\nmaterials = [\"ice\", \"rubber\"]\nrestitution = 0.3\nfriction = 0.05\n\
-                 [[pair]]\na = \"b\"\nb = \"a\"\nfriction = 0.6\n\
+                 [[pair]]\na = \"b\"\nb = \"a\"\nfriction = 0.6\nrolling_friction_m = 0.02\ntorsional_friction_m = 0\n\
                  [[pair]]\nmaterials = [\"ice\", \"ice\"]\nrestitution = 0.7\n";
     let materials = "[materials.ice]\nfriction = 0.01\n[materials.rubber]\nfriction = 1\nrestitution = 0.8\n";
     let text = format!("{materials}{}{}{}{pairs}", ball("a", "ice"), ball("b", "rubber"), ball("c", "ice"));
@@ -104,6 +104,8 @@ fn pairs_of_bodies_and_of_materials_have_constants_of_their_own() {
     assert_eq!(between(&scene, "b", "c"), (0.3, 0.05));
     assert_eq!(between(&scene, "a", "b"), (0.3, 0.6), "bodies go before materials");
     assert_eq!(between(&scene, "a", "c"), (0.7, 0.01));
+    let spec = scene.pairs.iter().find(|pair| pair.friction == Some(0.6)).unwrap();
+    assert_eq!((spec.rolling_friction, spec.torsional_friction), (Some(0.02), Some(0.0)));
 }
 
 #[test]

@@ -119,13 +119,35 @@ fn the_larger_condim_and_friction_of_a_pair_count() {
 #[test]
 fn friction_of_pairs_that_is_left_out_is_noted() {
     let notes = |pair: &str| read(&falling(["", ""], &format!("<pair geom1='f' geom2='g' {pair}/>"))).notes.join("\n");
-    let (second, torsional) = ("the second sliding friction of a pair", "torsional and rolling friction of a pair");
-    assert!(notes("friction='.3 .1'").contains(second));
-    assert!(notes("friction='.3 .3 .05 0 0' condim='4'").contains(torsional));
-    assert!(notes("friction='.3 .3 .05 .01 .01' condim='6'").contains(torsional));
-    for silent in ["friction='.3 .3'", "friction='.3 .3 .05 .01 .01'", "friction='.3 .1' condim='1'", ""] {
+    assert!(notes("friction='.3 .1'").contains("the second sliding friction of a pair"));
+    assert!(notes("friction='.3 .3 .05 .01 .02' condim='6'").contains("the second rolling friction of a pair"));
+    for silent in [
+        "friction='.3 .3'",
+        "friction='.3 .3 .05 .01 .01' condim='6'",
+        "friction='.3 .3 .05 .01 .01'",
+        "friction='.3 .1' condim='1'",
+        "",
+    ] {
         assert!(!notes(silent).contains("friction of a pair"), "{silent}: {}", notes(silent));
     }
+}
+
+/// The turning frictions of a pair are its own where `condim` has them, else none, whatever those of its geoms are.
+#[test]
+fn a_pair_has_its_own_torsional_and_rolling_friction() {
+    let frictions = |geoms: &str, pair: &str| {
+        let file = read(&falling([geoms; 2], &format!("<pair geom1='f' geom2='g' {pair}/>")));
+        let (world, _) = file.build().unwrap();
+        let id = |name| world.find(name).unwrap();
+        let found = world.pair_material((id("f"), 0), (id("b"), 0)).unwrap();
+        [found.friction, found.torsional_friction, found.rolling_friction]
+    };
+    let turning = "condim='6' friction='.5 .02 .003'";
+    assert_eq!(frictions(turning, "friction='.3 .3 .05 .01 .01' condim='6'"), [0.3, 0.05, 0.01]);
+    assert_eq!(frictions(turning, "friction='.3 .3 .05 .01 .01' condim='4'"), [0.3, 0.05, 0.0]);
+    assert_eq!(frictions(turning, "friction='.3 .3 .05'"), [0.3, 0.0, 0.0]);
+    assert_eq!(frictions("friction='.5 .02 .003'", "condim='6'"), [0.5, 0.02, 0.003]);
+    assert_eq!(frictions("friction='.5 .02 .003'", "friction='.3' condim='6'"), [0.3, 0.005, 0.0001]);
 }
 
 #[test]

@@ -247,9 +247,10 @@ fn made_in_code() -> World {
     add_crane(&mut world, mesh);
     add_joints(&mut world);
     let [a, b] = ["body \"0\"", "crane"].map(|name| world.find(name).unwrap());
-    let pair = |restitution, friction, collides| PairMaterial { restitution, friction, collides };
-    world.set_pair_material(a, b, pair(Some(0.5), None, None)).unwrap();
-    world.set_pair_material(PairSide::Material(3), PairSide::Material(3), pair(None, Some(0.2), Some(false))).unwrap();
+    let turning = PairMaterial { restitution: Some(0.5), rolling_friction: Some(0.01), ..PairMaterial::default() };
+    world.set_pair_material(a, b, PairMaterial { torsional_friction: Some(0.0), ..turning }).unwrap();
+    let ignored = PairMaterial { friction: Some(0.2), collides: Some(false), ..PairMaterial::default() };
+    world.set_pair_material(PairSide::Material(3), PairSide::Material(3), ignored).unwrap();
     world
 }
 

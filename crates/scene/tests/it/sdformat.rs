@@ -164,7 +164,10 @@ fn a_collision_without_mu_has_a_friction_of_one() {
     };
     let friction = |surface: &str, own: Option<f64>| {
         let mut options = UrdfOptions::default();
-        own.iter().for_each(|own| options.surface.contact.friction = *own);
+        if let Some(own) = own {
+            options.surface.contact.friction = own;
+            options.friction_given = true;
+        }
         let scene = parse(&text(surface), "m.sdf", &options).unwrap_or_else(|error| panic!("{error}"));
         assert!(!scene.notes.iter().any(|note| note.contains("mu")), "{:?}", scene.notes);
         scene.articulated[0].links[0].shapes[0].surface.contact.friction
@@ -172,7 +175,8 @@ fn a_collision_without_mu_has_a_friction_of_one() {
     let given = "<surface><friction><ode><mu>0.3</mu></ode></friction></surface>";
     let bounce = "<surface><bounce><restitution_coefficient>0.2</restitution_coefficient></bounce></surface>";
     assert_eq!([friction("", None), friction(bounce, None), friction("<surface/>", None)], [1.0; 3]);
-    assert_eq!([friction(given, None), friction(given, Some(0.7)), friction("", Some(0.7))], [0.3, 0.3, 0.7]);
+    assert_eq!([friction(given, None), friction(given, Some(0.7))], [0.3; 2]);
+    assert_eq!([friction("", Some(0.7)), friction("", Some(0.5))], [0.7, 0.5]);
 }
 
 /// A box of a world falls on the static plane and comes to rest half its size above it.

@@ -23,14 +23,14 @@ use tumble::dynamics::PairMaterial;
 
 #[pymethods]
 impl World {
-    /// Sets restitution and friction of the contacts of two bodies from the next step on,
+    /// Sets restitution and the frictions of the contacts of two bodies from the next step on,
     /// overriding the combination rules, and whether they collide at all.
     ///
     /// a, b: handles or names in any order; ``"ARTICULATION/LINK"`` is a link of an articulation
-    /// with the links fixed to it. None keeps the rule; without all the pair has no constants of
+    /// with the links fixed to it. rolling_friction, torsional_friction: m, at least 0. None keeps the rule; without all the pair has no constants of
     /// its own any more. collides: False ignores the pair; True does not override groups and masks. Forks have the same pairs. ``save`` does not include them, as it does not
     /// include materials.
-    #[pyo3(signature = (a, b, *, restitution=None, friction=None, collides=None, **unknown), text_signature = "($self, a, b, *, restitution=None, friction=None, collides=None)")]
+    #[pyo3(signature = (a, b, *, restitution=None, friction=None, rolling_friction=None, torsional_friction=None, collides=None, **unknown), text_signature = "($self, a, b, *, restitution=None, friction=None, rolling_friction=None, torsional_friction=None, collides=None)")]
     #[allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
     fn set_pair_material(
         &self,
@@ -39,11 +39,18 @@ impl World {
         b: &Bound<'_, PyAny>,
         restitution: Option<f64>,
         friction: Option<f64>,
+        rolling_friction: Option<f64>,
+        torsional_friction: Option<f64>,
         collides: Option<bool>,
         unknown: Option<Unknown<'_, '_>>,
     ) -> Result<()> {
         keywords::check(unknown, "World.set_pair_material")?;
-        pairs::set(&self.shared, py, [a, b], PairMaterial { restitution, friction, collides })
+        pairs::set(
+            &self.shared,
+            py,
+            [a, b],
+            PairMaterial { restitution, friction, rolling_friction, torsional_friction, collides },
+        )
     }
 
     /// Returns restitution and friction of the contacts of two bodies: the pair's own constants if

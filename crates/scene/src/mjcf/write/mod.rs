@@ -242,7 +242,7 @@ impl<'w> MjcfWriter<'w> {
     /// Writes pairs of objects that never collide.
     fn pairs(&mut self) {
         let world = self.world;
-        for ([a, b], PairMaterial { restitution, friction, collides }) in world.pair_materials() {
+        for ([a, b], material) in world.pair_materials() {
             let named = |side: &PairSide| match side {
                 PairSide::Object(id) => world.get::<RigidBody>(*id).and(self.names.get(&(*id, None)).cloned()),
                 PairSide::Part(id, part) => {
@@ -251,7 +251,7 @@ impl<'w> MjcfWriter<'w> {
                 }
                 PairSide::Material(_) => None,
             };
-            match (named(a), named(b), collides) {
+            match (named(a), named(b), material.collides) {
                 (Some(a), Some(b), Some(false)) if a != b && a != "world" && b != "world" => {
                     let t = Attributes::of("body1", a).with("body2", b);
                     if !self.contacts.iter().any(|(_, other)| *other == t) {
@@ -263,7 +263,8 @@ impl<'w> MjcfWriter<'w> {
                     "surface constants of pairs, and pairs of materials or with static bodies, are left out",
                 ),
             }
-            if *collides == Some(false) && (restitution.is_some() || friction.is_some()) {
+            let alone = PairMaterial { collides: Some(false), ..PairMaterial::default() };
+            if material.collides == Some(false) && *material != alone {
                 self.note("a pair", "constants of a pair that does not collide are left out");
             }
         }
