@@ -2,6 +2,7 @@
 
 mod compound;
 pub(crate) mod cone;
+mod curvature;
 mod cylinder;
 pub(crate) mod ellipsoid;
 mod mesh;

@@ -2,6 +2,7 @@
 //! of the pairs.
 
 mod coplanar;
+mod curvature;
 pub(crate) mod detect;
 mod internal_edges;
 pub(crate) mod laws;
@@ -9,7 +10,6 @@ pub(crate) mod motion;
 pub(crate) mod own_tests;
 pub(crate) mod pair;
 pub(crate) mod pair_material;
-mod rim;
 mod separation;
 pub(crate) mod surfaces;
 pub(crate) mod time_of_impact;

@@ -3,9 +3,11 @@
 //! The contact point is not a material point of a rounded surface: a sphere that spins in place has
 //! a centripetal acceleration at its lowest point, and yet does not rise (thesis Fig. 17). So the
 //! velocity `ṗ` of the point and the rate `ṅ` of the normal follow from the core features that carry
-//! the contact. With `s = v_A(p) − v_B(p)`:
+//! the contact (`curvature.rs`). With `s = v_A(p) − v_B(p)`:
 //!
 //! ```text
+//! normal of two core points     (P_A + P_B + gap)·ṅ = (1 − n·nᵀ)·[v_A(p_A) + P_A·(ω_A×n) − v_B(p_B) + P_B·(ω_B×n)]
+//! point on A, or on B           ṗ = v_A(p_A) + P_A·(ω_A×n − ṅ),      ṗ = v_B(p_B) + P_B·(ṅ − ω_B×n)
 //! rate of the rows          ds/dt = [a + α×r + ω×(ṗ − v)]_A − [ … ]_B        d²gap/dt² = n·ds/dt + ṅ·s
 //! contact after t seconds   n(t) = n + t·ṅ, normalized        p(t) = p + t·ṗ ± ½·gap·n
 //! ```
@@ -14,13 +16,15 @@
 //! |---|---|
 //! | `a`, `α`, `v`, `ω` | accelerations and velocities of a part |
 //! | `r` | contact point, from the part's origin |
+//! | `P` | rate of a surface's point by the normal: `r·(1 − n·nᵀ)` for a sphere of radius `r` about a core feature |
 //! | `±` | + if `ṗ` is that of A's surface, − of B's: the point is on the surface when the gap has closed |
 
+use super::curvature::Rounded;
 use super::detect::ContactConstraint;
-use super::rim::rim_rate;
+use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::world::Core;
-use tumble_collide::{Contact, NormalFrom, Shape, Vec3};
+use tumble_collide::{Contact, Mat3, NormalFrom, Shape, Vec3};
 
 /// Rates of a contact's normal and point, world axes.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +44,8 @@ pub(crate) struct Moved {
     pub time: f64,
     /// Displacement of the contact point until then, m.
     pub way: Vec3,
-    /// Rate of the relative velocity as the contact moves, without the next two, m/s², world axes.
+    /// Rate of the relative velocity as the contact moves, without the next two, m/s², world axes. That of the origin of a part
+    /// beside its center of mass is included.
     pub rate: Vec3,
     /// That by the accelerations of links at constant generalized velocity.
     pub of_links: Vec3,
@@ -61,6 +66,17 @@ impl Moved {
 /// a contact for a moment.
 const MAX_TURN: f64 = 0.5;
 
+/// The object that carries a part.
+#[derive(Clone, Copy)]
+enum Carrier {
+    /// Its rows are those of the time of the contact.
+    Body,
+    /// Its rows are those of the configuration of the step.
+    Link,
+    /// No force moves it.
+    Driven,
+}
+
 /// The accelerations of a part.
 #[derive(Clone, Copy)]
 enum Carried {
@@ -70,11 +86,20 @@ enum Carried {
     AtConstantVelocity,
 }
 
-/// Returns the rate of a normal that points from B's core point to A's, for the relative velocity
-/// of the two.
-fn turning(c: &Contact, gap: f64, relative: Vec3) -> Vec3 {
-    let distance = c.core_a + c.core_b + gap;
-    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
+/// Returns the rate of a normal that points from B's core point to A's, for the relative velocity of the two, the sum of
+/// their radii and of the gap, and the sum of their other curvatures.
+fn turning(normal: &Vec3, relative: Vec3, distance: f64, more: Option<Mat3>) -> Vec3 {
+    let Some(more) = more else {
+        return if distance > 0.0 { across(relative, normal) / distance } else { Vec3::zeros() };
+    };
+    let [_, t, b] = ContactFrame::new(Vec3::zeros(), *normal).axes;
+    let (tt, tb, bb) = (t.dot(&(more * t)) + distance, t.dot(&(more * b)), b.dot(&(more * b)) + distance);
+    let (along, across, determinant) = (t.dot(&relative), b.dot(&relative), tt * bb - tb * tb);
+    if determinant > 0.0 {
+        (t * (bb * along - tb * across) + b * (tt * across - tb * along)) / determinant
+    } else {
+        Vec3::zeros()
+    }
 }
 
 /// Returns the part of `v` across a unit direction.
@@ -83,22 +108,33 @@ fn across(v: Vec3, along: &Vec3) -> Vec3 {
 }
 
 impl ContactConstraint {
-    /// Returns the motion of the contact for the present velocities.
+    /// Returns the motion of the contact for the present velocities, with spheres about the core features.
     pub fn motion(&self, a: &PartState, b: &PartState) -> ContactMotion {
+        self.motion_on([a, b], [Rounded::sphere(self.contact.core_a), Rounded::sphere(self.contact.core_b)])
+    }
+
+    /// Returns the motion of the contact of two surfaces.
+    fn motion_on(&self, [a, b]: [&PartState; 2], [on_a, on_b]: [Rounded; 2]) -> ContactMotion {
         let (c, n, gap) = (&self.contact, &self.contact.normal, self.gap_found());
-        let (core_a, core_b) = (c.point + n * (0.5 * gap + c.core_a), self.point_b() - n * (0.5 * gap + c.core_b));
-        let (va, vb) = (a.velocity_at(&core_a), b.velocity_at(&core_b));
+        let (core_a, core_b) = (c.point + n * (0.5 * gap + on_a.core), self.point_b() - n * (0.5 * gap + on_b.core));
+        let va = a.velocity_at(&core_a) + on_a.by_curvature(&a.angular_velocity.cross(n));
+        let vb = b.velocity_at(&core_b) - on_b.by_curvature(&b.angular_velocity.cross(n));
         let with_a =
-            |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: va - c.core_a * n_rate, side: -0.5 };
+            |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: va - on_a.rate(&n_rate), side: -0.5 };
         let with_b =
-            |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: vb + c.core_b * n_rate, side: 0.5 };
+            |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: vb + on_b.rate(&n_rate), side: 0.5 };
+        let (distance, more) = (on_a.core + on_b.core + gap, on_a.more_with(&on_b));
         let line = |along: &Vec3, owner: &PartState| {
-            turning(c, gap, across(va - vb, along)) + along * along.dot(&owner.angular_velocity.cross(n))
+            let rolls = along * along.dot(&owner.angular_velocity.cross(n));
+            let relative = va - vb - more.map_or(Vec3::zeros(), |more| more * rolls);
+            let aside = n.cross(along);
+            let more = more.map(|more| aside.dot(&(more * aside)) * Mat3::identity());
+            turning(n, across(relative, along), distance, more) + rolls
         };
         match &c.normal_from {
             NormalFrom::FaceOfA => with_b(a.angular_velocity.cross(n)),
             NormalFrom::FaceOfB => with_a(b.angular_velocity.cross(n)),
-            NormalFrom::CorePoints => with_a(turning(c, gap, va - vb)),
+            NormalFrom::CorePoints => with_a(turning(n, va - vb, distance, more)),
             NormalFrom::LineOfA(along) => with_b(line(along, a)),
             NormalFrom::LineOfB(along) => with_a(line(along, b)),
             NormalFrom::Edges => ContactMotion { normal_rate: Vec3::zeros(), point_rate: 0.5 * (va + vb), side: 0.0 },
@@ -128,27 +164,13 @@ impl ContactConstraint {
         linear + angular.cross(&(self.contact.point - s.position()))
     }
 
-    /// Returns the velocity of the contact point over the material of a cylinder's rim on a plane,
-    /// m/s.
-    fn along_rim<'s>(
-        &self,
-        motion: &ContactMotion,
-        [a, b]: [&PartState; 2],
-        shape: impl Fn(u32) -> Option<&'s Shape>,
-    ) -> Vec3 {
-        let (c, n) = (&self.contact, &self.contact.normal);
-        let rate = match c.normal_from {
-            NormalFrom::FaceOfA if c.core_b == 0.0 => shape(self.b).and_then(|shape| {
-                let point = self.point_b() - 0.5 * self.gap_found() * n;
-                rim_rate(shape, b, &point, &-n, &-motion.normal_rate)
-            }),
-            NormalFrom::FaceOfB if c.core_a == 0.0 => shape(self.a).and_then(|shape| {
-                let point = c.point + 0.5 * self.gap_found() * n;
-                rim_rate(shape, a, &point, n, &motion.normal_rate)
-            }),
-            _ => None,
-        };
-        rate.unwrap_or_default()
+    /// Returns the surfaces of both parts at the contact.
+    fn surfaces<'s>(&self, [a, b]: [&PartState; 2], shape: impl Fn(u32) -> Option<&'s Shape>) -> [Rounded; 2] {
+        let (c, n) = (&self.contact, self.contact.normal);
+        let half = 0.5 * self.gap_found() * n;
+        let on_a = Rounded::of(shape(self.a), a, (c.shapes[0], c.core_a), (c.point + half, -n));
+        let on_b = Rounded::of(shape(self.b), b, (c.shapes[1], c.core_b), (self.point_b() - half, n));
+        [on_a, on_b]
     }
 
     /// Returns the point of the contact on a part that is at `state`, the start of the step, m: where
@@ -187,18 +209,17 @@ impl ContactConstraint {
         &mut self,
         time: f64,
         [a, b]: [&PartState; 2],
-        moves: impl Fn(u32) -> bool,
+        carrier: impl Fn(u32) -> Carrier,
         shape: impl Fn(u32) -> Option<&'s Shape>,
     ) {
         let Contact { point, normal, .. } = self.contact;
-        let mut motion = self.motion(a, b);
-        motion.point_rate += self.along_rim(&motion, [a, b], shape);
-        let (rate, mut of_links, mut of_driven) = (self.rate(&motion, [a, b]), Vec3::zeros(), Vec3::zeros());
+        let motion = self.motion_on([a, b], self.surfaces([a, b], shape));
+        let (mut rate, mut of_links, mut of_driven) = (self.rate(&motion, [a, b]), Vec3::zeros(), Vec3::zeros());
         for (sign, part, state) in [(1.0, self.a, a), (-1.0, self.b, b)] {
-            if moves(part) {
-                of_links += sign * self.carried(state, Carried::AtConstantVelocity);
-            } else {
-                of_driven += sign * self.carried(state, Carried::Now);
+            match carrier(part) {
+                Carrier::Body => rate += sign * self.carried(state, Carried::AtConstantVelocity),
+                Carrier::Link => of_links += sign * self.carried(state, Carried::AtConstantVelocity),
+                Carrier::Driven => of_driven += sign * self.carried(state, Carried::Now),
             }
         }
         let left = time - self.found_at;
@@ -225,18 +246,21 @@ pub(crate) fn move_in_step(core: &Core, constraint: &mut ContactConstraint, time
     let owner = |part: u32| core.owners[part as usize];
     let entry = |part: u32| core.objects().at(owner(part).place as usize);
     let shape = |part: u32| entry(part).object.collidable()?.shape(owner(part).part as usize);
-    constraint.move_to(time, parts, |part| entry(part).moves(), shape);
+    let carrier = |part: u32| match entry(part) {
+        entry if !entry.moves() => Carrier::Driven,
+        entry if entry.object.integratable().is_some_and(|body| body.holds_velocity()) => Carrier::Link,
+        _ => Carrier::Body,
+    };
+    constraint.move_to(time, parts, carrier, shape);
     constraint.moved.time > 0.0
 }
 
-/// Returns the present motion of a contact, with that of a lowest point along its rim.
+/// Returns the present motion of a contact.
 pub(crate) fn of(core: &Core, constraint: &ContactConstraint) -> ContactMotion {
     let parts = [constraint.a, constraint.b].map(|part| &core.derived.part_states[part as usize]);
     let shape = |part: u32| {
         let owner = core.owners[part as usize];
         core.objects().at(owner.place as usize).object.collidable()?.shape(owner.part as usize)
     };
-    let mut motion = constraint.motion(parts[0], parts[1]);
-    motion.point_rate += constraint.along_rim(&motion, parts, shape);
-    motion
+    constraint.motion_on(parts, constraint.surfaces(parts, shape))
 }

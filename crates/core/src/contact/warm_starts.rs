@@ -109,6 +109,11 @@ impl WarmStarts {
         self.of_pair(key.pair, &mut 0).iter().any(|e| e.force != [0.0; 3])
     }
 
+    /// Returns whether this contact itself carried a force.
+    pub fn has(&self, key: &ContactKey) -> bool {
+        self.of_pair(key.pair, &mut 0).iter().any(|e| e.key == *key && e.force != [0.0; 3])
+    }
+
     /// Returns whether the entries are sorted by key, as searches require.
     pub fn in_order(&self) -> bool {
         self.entries.is_sorted_by(|a, b| a.key < b.key) && self.rows.is_sorted_by_key(|row| row.owner)

@@ -47,7 +47,7 @@ use crate::object::{Level, RowTarget};
 use crate::settings::{Integrator, Settings};
 use crate::world::{Core, StepError};
 use nalgebra::ComplexField;
-use resolve::Resolved;
+use resolve::{Impacts, Resolved};
 
 /// The stepper of the thesis, `backtracking`.
 #[derive(Default)]
@@ -166,16 +166,17 @@ impl Backtracking {
         Ok(())
     }
 
-    /// Computes contacts and rows for a sub-step of `h` seconds, and resolves impacts.
-    fn meet(&mut self, core: &mut Core, h: f64) -> Result<(), StepError> {
+    /// Computes contacts and rows for a sub-step of `h` seconds, and resolves impacts. Returns whether any was new.
+    fn meet(&mut self, core: &mut Core, h: f64) -> Result<bool, StepError> {
         core.by_impulses = false;
         self.gather(core, h)?;
         self.roles(core);
-        if self.resolve_impacts(core) {
+        let impacts = self.resolve_impacts(core);
+        if impacts != Impacts::None {
             self.gather(core, h)?;
             self.roles(core);
         }
-        Ok(())
+        Ok(impacts == Impacts::New)
     }
 
     /// Advances by a sub-step of `h` seconds whose contacts move, extrapolated (`extrapolation.rs`). Returns its length, s, and its
@@ -191,12 +192,12 @@ impl Backtracking {
         let (keys, mut same) = (carrying(core), true);
         before.restore(core);
         for half in [0.0, 0.5] {
-            self.meet(core, 0.5 * whole)?;
+            let struck = self.meet(core, 0.5 * whole)?;
             let went = self.motion(core, 0.5 * whole)?;
             if went < 0.499_999 * whole {
                 return Ok((half * whole + went, 0.0));
             }
-            same &= carrying(core) == keys;
+            same &= !struck && carrying(core) == keys;
         }
         if !same && (core.settings.integrator != Integrator::DormandPrince || whole <= floor) {
             return Ok((whole, 0.0));

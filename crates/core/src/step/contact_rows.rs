@@ -156,7 +156,10 @@ fn acting_point(
         // the lever arm stays that of the contact: the lowest point of a spinning sphere does not turn
         // with it
         Some(acting) => constraint.point_on(part, found) + acting.position() - found.position(),
-        None => constraint.point_on(part, found),
+        None => {
+            let from_origin = found.angular_velocity.cross(&entry.center_from_origin(found));
+            constraint.point_on(part, found) - constraint.moved.time * from_origin
+        }
     }
 }
 

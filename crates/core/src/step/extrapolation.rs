@@ -89,9 +89,11 @@ fn turning(core: &Core, constraint: &ContactConstraint) -> f64 {
     let motion = motion::of(core, constraint);
     let arm = |part: u32, state: &PartState| {
         let entry = core.objects().at(core.owners[part as usize].place as usize);
-        let arm: Vec3 = constraint.contact.point - state.position();
+        let center = entry.center_from_origin(state);
+        let arm: Vec3 = constraint.contact.point - state.position() - center;
         if entry.moves() {
-            (motion.point_rate - state.velocity).norm() / arm.norm().max(f64::MIN_POSITIVE)
+            let velocity = state.velocity + state.angular_velocity.cross(&center);
+            (motion.point_rate - velocity).norm() / arm.norm().max(f64::MIN_POSITIVE)
         } else {
             0.0
         }

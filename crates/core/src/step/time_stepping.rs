@@ -47,15 +47,15 @@ use super::impact::{self, Candidate, Part};
 use super::patch::solve_patches;
 use super::warm_start::{row_starts, warm_start};
 use super::{Moment, StepContext, Stepper, Workspace};
-use crate::constraint::rows::RowSet;
+use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::pair::{PredictionMode, Reach};
 use crate::contact::time_of_impact::time_contacts;
 use crate::each_object::{Numbers, each_object};
 use crate::integrators::context::free_motion;
 use crate::linearize::{ROUNDING, Switch};
-use crate::object::Level;
 use crate::object::part_state::PartState;
+use crate::object::{Level, RowTarget};
 use crate::sensor::loads::SubstepForces;
 use crate::settings::Settings;
 use crate::solver::SolverSettings;
@@ -289,7 +289,8 @@ impl TimeStepping {
                 far.push(b);
             }
             // rows are those of the middle of the step, and go on turning for the other half
-            let turning = if target.set == RowSet::Equality { 0.5 * h * target.bias_acceleration } else { 0.0 };
+            let turns = target.set != RowSet::HalfLine || open_in_the_middle(work, block, target, u0, h) <= 0.0;
+            let turning = if turns { 0.5 * h * target.bias_acceleration } else { 0.0 };
             work.c[block.row as usize] += reach + turning - target.velocity;
         }
         warm_start(core, work, h);
@@ -386,6 +387,13 @@ impl TimeStepping {
         );
         core.check_finite(dp, Some(&mut *middle))
     }
+}
+
+/// Returns the gap of a limit after free motion of half a step of `h` seconds with the velocity `u`, m or rad.
+fn open_in_the_middle(work: &Workspace, block: &Block, target: &RowTarget, u: &[f64], h: f64) -> f64 {
+    let rate = work.rows.row_velocity(block, 0, u) - target.velocity;
+    // the row is that of the middle, and so is its rate: the mean one is that of a quarter
+    target.error + 0.5 * h * (rate - 0.25 * h * target.bias_acceleration)
 }
 
 /// Writes `n` numbers to `out`.

@@ -3,6 +3,7 @@
 use crate::derived::Cache;
 use crate::object::Object;
 use crate::object::part_state::{PartState, StateRange};
+use crate::rigid::RigidBody;
 use crate::threads::Threads;
 use crate::world::ObjectState;
 use crate::world::walk::Walk;
@@ -90,6 +91,12 @@ impl Entry<'_> {
     /// Returns whether forces and impulses move it: dynamic and awake.
     pub fn moves(&self) -> bool {
         self.dynamic() && !self.asleep
+    }
+
+    /// Returns the vector from the origin of its part to the center of mass of a rigid body, world axes, m; zero for all others.
+    pub(crate) fn center_from_origin(&self, state: &PartState) -> Vec3 {
+        let any: &dyn std::any::Any = self.object;
+        any.downcast_ref::<RigidBody>().map_or(Vec3::zeros(), |body| state.pose.rotation * body.center_in_part())
     }
 }
 

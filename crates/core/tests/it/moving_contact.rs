@@ -297,3 +297,30 @@ fn a_ball_that_is_thrown_along_a_dome_slides_rolls_and_leaves_it() {
         }
     }
 }
+
+/// A ball whose center of mass is beside its middle rolls on a plane: energy is a constant of the motion.
+#[test]
+fn a_ball_with_its_mass_beside_its_middle_keeps_its_energy() {
+    for (stepper, most) in [("time_stepping", [1e-3, 6e-5, 4e-6]), ("backtracking", [1e-4; 3]), ("dp", [1e-8; 3])] {
+        for (rate, most) in [60.0, 240.0, 960.0].into_iter().zip(most) {
+            let mut world = world(stepper, 1.0 / rate);
+            if stepper == "dp" {
+                let settings = world.settings().with_integrator_tolerance(1e-11);
+                world.set_settings(settings).unwrap();
+            }
+            let rough = Material { restitution: 0.0, friction: 5.0, ..Material::default() };
+            world.add_static(RigidBody::fixed(Shape::half_space()).with_material(rough)).unwrap();
+            let (center, spin) = (Vec3::new(0.05, 0.03, -0.06), Vec3::new(0.0, 5.0, 1.0));
+            let ball = RigidBody::new(sphere(0.2)).with_mass(1.0).with_material(rough).with_center_of_mass(center);
+            let ball = ball.with_pose(Pose::translation(0.0, 0.0, 0.2)).with_angular_velocity(spin);
+            let ball = ball.with_velocity(spin.cross(&(center + 0.2 * Vec3::z())));
+            world.add(ball).unwrap();
+            let before = world.energy().total();
+            (0..(0.3 * rate).round() as usize).for_each(|_| {
+                world.step().unwrap();
+            });
+            let change = world.energy().total() / before - 1.0;
+            assert!(change.abs() < most, "{stepper} at {rate} Hz: {change} of the energy");
+        }
+    }
+}

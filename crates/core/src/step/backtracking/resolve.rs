@@ -1,7 +1,8 @@
 //! Impacts and resting contacts at the start of a sub-step: `ResolveImpacts` and `ResolveContacts` of the thesis.
 
 use super::{Backtracking, FLOOR, is_soft};
-use crate::constraint::rows::RowSet;
+use crate::constraint::rows::{Block, RowSet};
+use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
 use crate::sensor::loads::SubstepForces;
 use crate::solver::SolverSettings;
@@ -9,7 +10,7 @@ use crate::step::adhesion::adhere;
 use crate::step::budget::IMPACTS;
 use crate::step::contacts::{build_rows, free_motion_change, gyroscopic, impulses, row_velocities, whiten};
 use crate::step::correction;
-use crate::step::event_location::LimitRole;
+use crate::step::event_location::{LimitRole, Role, SLOW};
 use crate::step::held_forces::{hold_forces, push_to};
 use crate::step::impact::{self, Candidate};
 use crate::step::patch::solve_patches;
@@ -19,6 +20,9 @@ use tumble_collide::NormalFrom;
 
 /// Maximum number of passes of the impact phase.
 const IMPACT_PASSES: u32 = 200;
+/// A closed contact of a pair that lasts is an impact if it approaches faster, m/s. Slower, it is another feature of a contact
+/// that rolls, with what the forces of the sub-step before have left of its approach.
+const SURE: f64 = 0.05;
 
 /// The outcome of a solve for contact forces.
 pub(super) enum Resolved {
@@ -28,10 +32,20 @@ pub(super) enum Resolved {
     SlideEnds(f64),
 }
 
+/// Impacts at the start of a sub-step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Impacts {
+    /// No velocity changed.
+    None,
+    /// Contacts that last, and limits, lost a slow approach: what the forces of the sub-step before left of it.
+    Slow,
+    /// Surfaces met, or a limit was reached at speed.
+    New,
+}
+
 impl Backtracking {
-    /// Resolves impacts (thesis `ResolveImpacts`). Returns whether any velocity changed, so that
-    /// other contacts may be near now.
-    pub(super) fn resolve_impacts(&mut self, core: &mut Core) -> bool {
+    /// Resolves impacts (thesis `ResolveImpacts`). After any, other contacts may be near.
+    pub(super) fn resolve_impacts(&mut self, core: &mut Core) -> Impacts {
         let work = &mut self.work;
         let s = core.settings;
         let candidates: Vec<Candidate> = work
@@ -64,8 +78,10 @@ impl Backtracking {
         let before = u.clone();
         let budget = core.meter.left(IMPACTS);
         impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
-        let struck = total.iter().any(|l| *l != 0.0);
-        if struck {
+        let mut impacts = Impacts::None;
+        if total.iter().any(|l| *l != 0.0) {
+            impacts = if self.has_new(core, &total) { Impacts::New } else { Impacts::Slow };
+            let work = &mut self.work;
             core.touch_impacts(&work.contact_constraints, impulses(work, &total, 0.0));
             if core.has_breakable_joints() {
                 core.break_joints(&row_starts(work, &total, 1.0 / core.settings.dt));
@@ -82,7 +98,24 @@ impl Backtracking {
             }
             push_to(core, &u, &before);
         }
-        struck
+        impacts
+    }
+
+    /// Returns whether any of the impulses is an impact: of a contact that does not last, or of a limit, whose velocity it changes
+    /// by more than [`SLOW`], or of another feature of a pair that lasts, if that is open or approaches at [`SURE`].
+    fn has_new(&self, core: &Core, impulses: &[f64]) -> bool {
+        let work = &self.work;
+        let (contacts, others) = work.rows.blocks.split_at(work.contact_constraints.len());
+        let change = |block: &Block| work.rows.own(block, 0, 0) * impulses[block.row as usize].abs();
+        let begins = |((block, contact), role): ((&Block, &ContactConstraint), &Role)| {
+            let least = if contact.contact.gap > core.settings.contact_tolerance { SLOW } else { SURE };
+            change(block) > if role.lasts { least } else { SLOW } && !core.state.warm.has(&contact.key)
+        };
+        contacts.iter().zip(&work.contact_constraints).zip(&self.watch.roles).any(begins)
+            || others
+                .iter()
+                .zip(&work.targets)
+                .any(|(block, target)| target.set == RowSet::HalfLine && change(block) > SLOW)
     }
 
     /// Moves the contacts that touch to the middle of the rest of the frame, so that their forces act
