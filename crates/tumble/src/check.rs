@@ -1,11 +1,11 @@
 //! `tumble check`: reads and builds files without running them.
 
 use crate::args::{CheckOptions, OpeningOptions, kind};
+use crate::cave::key;
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::collide::{RepairSettings, Shape, TreeSettings};
 use tumble::dynamics::{ArticulatedBody, World};
-use tumble::net::sync::udp::SharedKey;
 use tumble::render::{Blend, DebugDraw, Drawing, ProjectorColor, RenderError, ScreenMesh, Warp};
 use tumble::scene::cave::{Cave, MAX_BYTES, Surface, is_cave, resolve_cave, shipped_caves};
 use tumble::scene::{
@@ -109,8 +109,7 @@ fn check_files(cave: &Cave) -> Result<(), Failure> {
             ScreenMesh::load(file).map_err(named)?;
         }
     }
-    let key = cave.security.as_ref().map(|security| SharedKey::read(&security.key_file)).transpose();
-    key.map(drop).map_err(|e| Failure::input(format!("[security] of {}: {e}", cave.file)))
+    key(cave).map(drop)
 }
 
 fn scene(name: &str) -> Result<String, Failure> {

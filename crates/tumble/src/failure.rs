@@ -24,6 +24,16 @@ impl Failure {
         Failure::Run(format!("error: {doing}: {}\n", why.to_string()))
     }
 
+    /// A failure at run time names the facets of its process, unless it does so already.
+    pub fn of_facets(self, title: &str) -> Failure {
+        match self {
+            Failure::Run(report) if !report.starts_with("error: facet") => {
+                Failure::Run(report.replacen("error: ", &format!("error: {title}: "), 1))
+            }
+            other => other,
+        }
+    }
+
     /// The whole message, with a final line feed.
     pub fn report(&self) -> &str {
         match self {

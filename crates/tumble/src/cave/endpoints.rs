@@ -49,11 +49,12 @@ const LOOKUP_INTERVAL: Duration = Duration::from_millis(100);
 /// Reads the cave's key, if the cave has one.
 pub fn key(cave: &Cave) -> Result<Option<SharedKey>, Failure> {
     let read = |file: &Path| {
+        let wrong = |why: &dyn std::fmt::Display| Failure::input(format!("[security] of {}: {why}", cave.file));
         // reading a pipe would block
         if std::fs::metadata(file).is_ok_and(|about| !about.is_file()) {
-            return Err(Failure::input(format!("key file {}: is no regular file", file.display())));
+            return Err(wrong(&format!("key file {}: is no regular file", file.display())));
         }
-        SharedKey::read(file).map_err(Failure::input)
+        SharedKey::read(file).map_err(|e| wrong(&e))
     };
     cave.security.as_ref().map(|s| read(&s.key_file)).transpose()
 }

@@ -44,6 +44,8 @@ mod simulation;
 mod tracker;
 mod web;
 
+pub use endpoints::key;
+
 use crate::failure::Failure;
 use args::{CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions};
 

@@ -9,7 +9,7 @@ use tumble::net::sync::transport::MAX_FACETS;
 use tumble::net::sync::{User, Viewer, scene_hash};
 use tumble::render::CaveView;
 use tumble::scene::cave::{Cave, CaveSource, Surface, resolve_cave};
-use tumble::scene::{CavePlace, SceneFile, resolve_scene, visual_notes};
+use tumble::scene::{CavePlace, SceneFile, read_file, resolve_scene, visual_notes};
 
 /// Name of the slot of the process that draws a preview.
 pub const PREVIEW: &str = "preview";
@@ -98,7 +98,7 @@ fn hash_for_joining(scene: &[u8; 32], cave: &Cave, world: &World) -> [u8; 32] {
         hasher.update(bytes);
     };
     // an unreadable file is reported where it is used
-    let content = |path: &Path| std::fs::read(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
+    let content = |path: &Path| read_file(path).map_or([0; 32], |bytes| *blake3::hash(&bytes).as_bytes());
     put(scene);
     put(format!("{:?} {:?}", cave.sync.mode, cave.users).as_bytes());
     // files count by their content: folders differ between machines

@@ -41,7 +41,10 @@ fn a_facet_covers_its_monitor_or_says_why_it_cannot() {
     assert_eq!((monitors.len(), size), (1, [1000, 700]));
 
     let (code, wrong) = run(&desktop, "displays-none", "size_px = [1000, 700]\nmonitor = \"HDMI-7\"");
-    assert!(wrong.contains(&format!("there is no monitor \"HDMI-7\"; there are: {name}")), "{wrong}");
+    assert!(
+        wrong.contains(&format!("error: facet f: the window: there is no monitor \"HDMI-7\"; there are: {name}")),
+        "{wrong}"
+    );
     assert_eq!(code, Some(1), "{wrong}");
     let (code, wrong) = run(&desktop, "displays-size", "size_px = [640, 480]\nfull_screen = true");
     let expected = format!("monitor \"{name}\" has 1000 x 700 pixels and the full-screen picture 640 x 480");
@@ -50,7 +53,9 @@ fn a_facet_covers_its_monitor_or_says_why_it_cannot() {
     assert!(code == Some(1) && wrong.contains(", expected 119.88 Hz"), "{wrong}");
     let (code, wrong) = run(&desktop, "displays-gpu", "size_px = [640, 480]\ngpu = \"a card of 2040\"");
     assert!(
-        code == Some(1) && wrong.contains("no graphics adapter has \"a card of 2040\" in its name; there are: "),
+        code == Some(1)
+            && wrong.contains(": no graphics adapter has \"a card of 2040\" in its name; there are: ")
+            && wrong.contains("error: facet f: "),
         "{wrong}"
     );
 

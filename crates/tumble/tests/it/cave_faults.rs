@@ -353,6 +353,24 @@ fn a_facet_that_is_given_up_fails_the_run() {
     place.assert_clean();
 }
 
+/// A crash, as in a graphics driver, is a failure of the facet; a kill is not.
+#[test]
+fn a_facet_that_crashes_fails_the_run() {
+    for (sent, code, said) in [(Signal::ABORT, 1, "r (killed by signal 6) ended by a failure"), (Signal::KILL, 0, "")] {
+        let place = Place::new("cave-crash", &wall());
+        let run = place.start("cave", &["--no-pictures", "--log-dir", &place.path("out")]);
+        place.wait_for("out", "r", 5);
+        signal(run.facet("r"), sent);
+        let at = *numbers(&place.log("out", "l")).last().unwrap();
+        place.wait_for("out", "l", at + 100);
+        signal(run.pid(), Signal::INT);
+        let (ended, _, wrong) = run.end();
+        assert_eq!(ended, Some(code), "{wrong}");
+        assert!(wrong.contains(said), "{wrong}");
+        place.assert_clean();
+    }
+}
+
 /// Both sides name a wrong key as a possible cause when no frame was shown.
 #[test]
 fn a_wrong_key_is_named() {

@@ -333,6 +333,16 @@ fn what_cannot_go_well_is_refused_before_the_start() {
         assert_eq!((code, wrong.matches("error: ").count()), (Some(2), 1), "{wrong}");
         assert!(wrong.contains(args[args.len() - 1]), "{wrong}");
     }
+    // the summary would replace the recording, the scene or the cave
+    let recorded = place.path("run.mcap");
+    for summary in [&recorded, &place.scene, &place.cave] {
+        let args = ["--no-pictures", "--duration", "0.1", "--record", &recorded, "--summary", summary];
+        let (code, _, wrong) = place.start("cave", &args).end();
+        assert_eq!(code, Some(2), "{wrong}");
+        assert!(wrong.contains(&format!("--summary {summary}: the run reads or records this file")), "{wrong}");
+    }
+    let (code, _, wrong) = place.start("cave", &["--no-pictures", "--sound", "127.0.0.1:0", "--duration", "0.1"]).end();
+    assert!(code == Some(2) && wrong.contains("--sound 127.0.0.1:0: nothing listens at port 0"), "{wrong}");
     assert!(Command::new("mkfifo").arg(place.path("key")).status().unwrap().success());
     std::fs::write(&place.cave, wall() + "[security]\nkey_file = \"key\"\n").unwrap();
     let (code, _, wrong) = place.start("serve", &["--transport", "udp"]).end();

@@ -88,6 +88,16 @@ fn say(socket: &mut WebSocket<TcpStream>, text: &str) {
 
 /// Both facets of one process have a page, and both pages take part in the barrier.
 #[test]
+fn frames_of_browsers_alone_are_refused() {
+    let place = Place::new("web-frames", &wall());
+    let (out, at) = (place.path("out"), free_address().to_string());
+    let (code, _, wrong) = place.start("cave", &["--web", &at, "--frames-dir", &out]).end();
+    assert_eq!(code, Some(2), "{wrong}");
+    assert!(wrong.contains(&format!("--web {at} with --frames-dir: browsers show all facets")), "{wrong}");
+    place.assert_clean();
+}
+
+#[test]
 fn facets_of_one_process_are_served_at_successive_ports() {
     let place = Place::new("web-group", &twins("[64, 48]"));
     let (out, summary) = (place.path("out"), place.path("summary.json"));

@@ -253,6 +253,28 @@ fn a_facet_that_must_be_a_window_fails_without_one() {
 }
 
 #[test]
+fn a_desktop_that_takes_connections_and_is_silent_is_not_waited_for() {
+    let folder = Folder::new("cave-silent-desktop");
+    make_runtime(&folder);
+    let cave = cave().replace("position_px", "output = \"window\"\nposition_px");
+    let (scene, cave) = (folder.write("scene.toml", SCENE), folder.write("cave.toml", cave));
+    // a server that has stopped: connections wait in its queue
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = silent.local_addr().unwrap().port();
+    let display = format!("127.0.0.1:{}", port.checked_sub(6000).expect("a port that a display can have"));
+    let args = ["cave", &scene, "--cave", &cave, "--duration", "0.04", "--no-realtime", "--quality", "fastest"];
+    let start = std::time::Instant::now();
+    let out = in_place(&folder, &args).env("DISPLAY", &display).output().unwrap();
+    let wrong = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{wrong}");
+    assert!(
+        wrong.contains(&format!("does not answer (DISPLAY={display}: it takes connections and is silent")),
+        "{wrong}"
+    );
+    assert!(start.elapsed() < std::time::Duration::from_secs(60), "{:?}", start.elapsed());
+}
+
+#[test]
 fn a_desktop_that_does_not_answer_is_said_and_drawn_for_in_memory() {
     if tumble::render::Renderer::new().is_err() {
         return skip("this machine has no graphics adapter");

@@ -38,12 +38,17 @@ fn named_pipes_are_refused_and_not_waited_for() {
         folder.write(&format!("{}.toml", &line[..4]), crate::common::cave(&format!("size_px = [80, 60]\n{line}")))
     };
     let (warp, blend) = (with("warp_file = \"warp.obj\""), with("blend_file = \"blend.png\""));
+    pipe("key");
+    let key = folder.write("key.toml", crate::common::cave("size_px = [80, 60]") + "[security]\nkey_file = \"key\"\n");
     for args in [
         &["check", &toml][..],
         &["check", &urdf],
         &["check", &obj],
         &["check", &warp],
         &["check", &blend],
+        &["check", &key],
+        &["cave", "pendulum", "--cave", &warp, "--offscreen", "--duration", "0.02"],
+        &["cave", "pendulum", "--cave", &blend, "--offscreen", "--duration", "0.02"],
         &["recover", &mcap, "--output", &out],
         &["run", &toml],
         &["run", "stack", "--restore", &mcap],

@@ -1,6 +1,7 @@
 //! Detection of a desktop on which a window can be opened.
 
 use std::os::unix::net::UnixStream;
+use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use x11rb::rust_connection::RustConnection;
 
@@ -9,6 +10,8 @@ use x11rb::rust_connection::RustConnection;
 const RETRY_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Interval between two attempts.
 const RETRY_INTERVAL: Duration = Duration::from_millis(100);
+/// Time for the answer of an X server that accepts the connection: on a busy machine it takes seconds.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The desktop of this process.
 pub enum Desktop {
@@ -37,13 +40,22 @@ pub fn desktop() -> Desktop {
             retried(connect).map_err(|e| format!("WAYLAND_DISPLAY={name}: {e}"))
         }
         (None, Some(name)) if too_high(&name) => Err(format!("DISPLAY={name}: invalid display number")),
-        (None, Some(name)) => {
-            let connect = || x11rb::connect(None).map(|(x, _)| Probe::X(Box::new(x))).map_err(|e| e.to_string());
-            retried(connect).map_err(|e| format!("DISPLAY={name}: {e}"))
-        }
+        (None, Some(name)) => retried(connect_x).map_err(|e| format!("DISPLAY={name}: {e}")),
         (None, None) => return Desktop::None,
     };
     answer.map_or_else(Desktop::Unreachable, Desktop::Available)
+}
+
+/// Connects to the X server. A thread waits for its answer, because a stopped server never gives one.
+fn connect_x() -> Result<Probe, String> {
+    let (sender, receiver) = mpsc::channel();
+    std::thread::spawn(move || {
+        let answer = x11rb::connect(None).map(|(x, _)| Probe::X(Box::new(x))).map_err(|e| e.to_string());
+        // nobody receives it after the timeout
+        let _ = sender.send(answer);
+    });
+    let silent = || format!("it takes connections and is silent for {} s", ANSWER_TIMEOUT.as_secs());
+    receiver.recv_timeout(ANSWER_TIMEOUT).map_err(|_| silent())?
 }
 
 /// Tries until it succeeds, or for [`RETRY_TIMEOUT`].

@@ -21,7 +21,8 @@ use super::args::{ComputeKind, FacetOptions};
 use super::endpoints::FacetEndpoint;
 use super::facet_report::Reporter;
 use super::lock;
-use super::run_setup::{Role, RunSetup};
+use super::run_setup::{PREVIEW, Role, RunSetup};
+use super::server::title;
 use super::signals::Signals;
 use super::simulation::CaveSimulation;
 use super::web::{FrameList, WebScreen, port_after};
@@ -51,7 +52,9 @@ pub fn run(options: &FacetOptions) -> Result<(), Failure> {
     let count = options.facet.len().max(1);
     let reporters: Vec<Reporter> =
         (0..count).map(|member| Reporter::start(options.parent_watch, member)).collect::<Result<_, _>>()?;
-    let outcome = show(options, &reporters);
+    let names: Vec<&str> = options.facet.iter().map(String::as_str).collect();
+    let title = title(if names.is_empty() { &[PREVIEW] } else { &names });
+    let outcome = show(options, &reporters).map_err(|failure| failure.of_facets(&title));
     if let Err(failure) = &outcome {
         reporters.iter().for_each(|reporter| reporter.line(failure.report()));
     }

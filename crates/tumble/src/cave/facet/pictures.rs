@@ -78,6 +78,12 @@ impl Pictures {
         self.slot().wanted = Some(frame);
     }
 
+    /// The session's side: takes no further picture, so the painter waits for none to be taken.
+    pub fn abandon(&self) {
+        self.slot().wanted = None;
+        self.0.1.notify_all();
+    }
+
     /// Returns whether the wanted picture is there within `timeout`, and the picture if it is in memory.
     pub fn take(&self, timeout: Duration) -> Result<Option<Option<Image>>, Failure> {
         let failed = |why: &dyn std::fmt::Display| Failure::run("drawing", why);

@@ -78,10 +78,31 @@ impl Wanted {
     }
 }
 
+/// Longest wait for the painter's end, which is a picture and the release of the device. The launcher kills a facet
+/// that takes 4 s to end.
+const END_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// The end of the painter, which closes the channel. When dropped, waits for it: a process that exits while a
+/// thread releases its device calls functions of a driver that is unloaded meanwhile.
+struct PainterEnd {
+    closed: Receiver<()>,
+    /// All that it delivers.
+    pictures: Vec<Pictures>,
+}
+
+impl Drop for PainterEnd {
+    fn drop(&mut self) {
+        self.pictures.iter().for_each(Pictures::abandon);
+        let _ = self.closed.recv_timeout(END_TIMEOUT); // a device that hangs ends with the process
+    }
+}
+
 /// Makes draw lists in the calling thread and pictures in its own.
 pub struct RenderThread {
     lists: ListMaker,
     requests: SyncSender<RenderRequest>,
+    /// Dropped after `requests`, whose end the painter waits for.
+    _end: PainterEnd,
     /// Pictures of the first facet.
     pictures: Pictures,
     /// Pictures of the other facets.
@@ -107,9 +128,12 @@ impl RenderThread {
         let all: Vec<Pictures> = canvases.iter().map(|canvas| canvas.pictures.clone()).collect();
         let (requests, incoming) = sync_channel::<RenderRequest>(1);
         let (ready, started) = sync_channel(1);
+        let (ends, end) = sync_channel(1);
         std::thread::Builder::new()
             .name("painter".into())
             .spawn(move || {
+                let _ends: SyncSender<()> = ends; // dropped last, after all that has the device
+                let canvases = canvases;
                 let mut renderer = match Renderer::with_adapter(gpu.as_deref()) {
                     Ok(renderer) => renderer,
                     Err(error) => {
@@ -121,6 +145,7 @@ impl RenderThread {
                 render_all(view, &canvases, &mut renderer, &incoming);
             })
             .map_err(|e| Failure::run("drawing", e))?;
+        let end = PainterEnd { closed: end, pictures: all.clone() };
         let (software, adapter) =
             started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
         // as in windows: a software driver is slow
@@ -128,6 +153,7 @@ impl RenderThread {
         let mut render_thread = RenderThread {
             lists,
             requests,
+            _end: end,
             pictures: all[0].clone(), // one for each canvas, and there is at least one
             others: all[1..].to_vec(),
             software,
@@ -219,4 +245,36 @@ pub fn image_hash(image: &Image) -> [u8; 16] {
 /// Returns the name of the facet's slot.
 pub fn slot_name(facet: Option<&Facet>) -> &str {
     facet.map_or(PREVIEW, |f| &f.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cave::args::CaveSceneOptions;
+    use crate::cave::run_setup::Role;
+    use tumble::scene::SceneFile;
+
+    /// A process that exits while a thread still releases its device crashes in the driver now and then.
+    #[test]
+    fn the_painter_has_released_its_device_when_it_is_dropped() {
+        if Renderer::new().is_err() {
+            println!("skipped: this machine has no graphics adapter");
+            return;
+        }
+        let scene = SceneFile::parse("[[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\n", "light").unwrap();
+        let surroundings = CaveSceneOptions { cave: "cube4".into(), environment: None };
+        let setup = RunSetup::load(scene, &surroundings, Role::Facet).ok().unwrap();
+        let painters = || {
+            let threads = std::fs::read_dir("/proc/self/task").unwrap().flatten();
+            threads
+                .filter_map(|t| std::fs::read_to_string(t.path().join("comm")).ok())
+                .filter(|n| n == "painter\n")
+                .count()
+        };
+        let facets = &setup.cave.facets[..1];
+        let thread = RenderThread::new(&setup, facets, Some(Quality::fastest()), DebugDraw::default()).ok().unwrap();
+        assert!(painters() > 0, "with the threads of a software driver, which have its name");
+        drop(thread);
+        assert_eq!(painters(), 0);
+    }
 }

@@ -54,6 +54,9 @@ impl ContactSound {
     /// Opens the sound for an engine at this address; `users` names the users.
     pub fn open(engine: SocketAddr, users: Vec<String>) -> Result<ContactSound, Failure> {
         let failed = |e| Failure::run(&format!("--sound {engine}"), e);
+        if engine.port() == 0 {
+            return Err(Failure::input(format!("--sound {engine}: nothing listens at port 0; expected 1 to 65535")));
+        }
         let any: SocketAddr = match engine {
             SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
             SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),

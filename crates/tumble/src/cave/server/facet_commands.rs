@@ -57,7 +57,12 @@ pub fn web_facets(launcher: &CaveOptions, cave: &Cave) -> Result<Vec<String>, Fa
         return Err(Failure::input(format!("--web {first}: {what}")));
     }
     let chosen = |name: &&str| launcher.web_facets.is_empty() || launcher.web_facets.iter().any(|one| one == name);
-    Ok(all.into_iter().filter(chosen).map(str::to_owned).collect())
+    let web: Vec<String> = all.into_iter().filter(chosen).map(str::to_owned).collect();
+    if launcher.draw.frames_dir.is_some() && web.len() == cave.facets.len() {
+        let why = "browsers show all facets and keep their pictures, so there is none to write; --web-facets names fewer, --log-dir writes frames.jsonl alone";
+        return Err(Failure::input(format!("--web {first} with --frames-dir: {why}")));
+    }
+    Ok(web)
 }
 
 /// Returns the addresses at which facets serve browsers, by name: one after the other, process by process,

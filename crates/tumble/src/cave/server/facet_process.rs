@@ -30,6 +30,9 @@ const ENDING_INTERVAL: Duration = Duration::from_millis(50);
 const KILL_TIMEOUT: Duration = Duration::from_secs(1);
 /// Exit codes of a facet that failed by itself: the command's own, and that of a panic.
 const OWN_FAILURES: [i32; 3] = [1, 2, 101];
+/// Signals of a process that crashes, as in a graphics driver: SIGILL, SIGTRAP, SIGABRT, SIGBUS, SIGFPE, SIGSEGV and
+/// SIGSYS. All others come from outside.
+const CRASHES: [i32; 7] = [4, 5, 6, 7, 8, 11, 31];
 
 /// A facet of a process.
 pub struct Member {
@@ -324,7 +327,7 @@ impl FacetProcess {
             }
         };
         self.failed = !status.success();
-        self.fault = status.code().filter(|code| OWN_FAILURES.contains(code)).map(|_| describe_exit(status));
+        self.fault = failed_by_itself(status).then(|| describe_exit(status));
         Some(status)
     }
 }
@@ -357,6 +360,12 @@ fn prepares(Received { report, heard, .. }: &Received, began: Option<Instant>) -
 /// Returns how the facets of a process are called.
 pub fn title(names: &[&str]) -> String {
     format!("{} {}", if names.len() > 1 { "facets" } else { "facet" }, names.join(", "))
+}
+
+/// Returns whether a process failed by itself, and was not ended by others.
+fn failed_by_itself(status: ExitStatus) -> bool {
+    let is_in = |numbers: &[i32], number: Option<i32>| number.is_some_and(|number| numbers.contains(&number));
+    is_in(&OWN_FAILURES, status.code()) || is_in(&CRASHES, status.signal())
 }
 
 pub fn describe_exit(status: ExitStatus) -> String {

@@ -18,6 +18,7 @@ mod start;
 mod summary;
 mod user_audio;
 
+pub use facet_process::title;
 pub use outputs::say;
 pub use start::run;
 pub use summary::Difference;

@@ -4,24 +4,26 @@
 use super::facet_commands::transport_kind;
 use super::recording::Target;
 use crate::cave::args::{CaveOptions, ServeOptions, TransportKind};
+use crate::cave::run_setup::RunSetup;
 use crate::failure::Failure;
 use crate::frames_folder::begin_all;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
-use tumble::scene::cave::Cave;
 
 /// Checks the outputs before anything is opened. Refuses a recording over the replayed one or over
 /// a file that is none, a
-/// summary that cannot be written, --listen without UDP, and frames among those of an earlier run.
+/// summary that cannot be written or would replace a file of the run, --listen without UDP, and frames among those of
+/// an earlier run. `replayed` is the recording that a replay shows.
 pub fn check(
     options: &ServeOptions,
     launcher: Option<&CaveOptions>,
-    cave: &Cave,
-    replaying: bool,
+    setup: &RunSetup,
+    replayed: Option<&Path>,
 ) -> Result<(), Failure> {
-    let recorded = Target::of(options, cave.recording.as_ref(), replaying);
+    let cave = &setup.cave;
+    let recorded = Target::of(options, cave.recording.as_ref(), replayed.is_some());
     recorded.as_ref().map_or(Ok(false), Target::check)?;
     if let Some(recorded) = &recorded
         && std::fs::metadata(&recorded.file).is_ok_and(|about| about.file_type().is_fifo())
@@ -41,7 +43,19 @@ pub fn check(
             "--listen {listen}: frames go through shared memory; the option needs --transport udp"
         )));
     }
-    options.summary.as_deref().map_or(Ok(()), writable)?;
+    if let Some(summary) = options.summary.as_deref() {
+        let recorded = recorded.as_ref().map(|recorded| recorded.file.as_path());
+        let read = [Path::new(&setup.scene.file), Path::new(&cave.file)].into_iter();
+        let others = read.chain(recorded).chain(options.replay_input.as_deref()).chain(replayed);
+        if let Some(other) = others.into_iter().find(|other| same(summary, other)) {
+            return Err(Failure::input(format!(
+                "--summary {}: the run reads or records this file ({}); choose another",
+                summary.display(),
+                other.display()
+            )));
+        }
+        writable(summary)?;
+    }
     let draw = launcher.map(|launcher| &launcher.draw);
     let folder = draw.and_then(|draw| draw.frames_dir.as_deref().or(draw.log_dir.as_deref()));
     let Some(folder) = folder else { return Ok(()) };

@@ -102,7 +102,7 @@ fn run_scene(
     let launcher = launcher.as_ref();
     let say = |what: &str| (!options.quiet).then(|| eprintln!("{what}"));
     setup.notes.iter().for_each(|note| _ = say(note));
-    outputs::check(options, launcher, &setup.cave, recording.is_some())?;
+    outputs::check(options, launcher, &setup, recording)?;
     let replay = recording.map(|path| Replay::open(path, setup.hash)).transpose()?;
     let key = key(&setup.cave)?;
     let mut entropy = Entropy::system().map_err(|e| Failure::run("the run", e))?;
