@@ -23,6 +23,7 @@ mod rim;
 mod smooth;
 mod support_plane;
 mod tolerances;
+mod touching;
 
 use super::reduce::Collector;
 use crate::sdf::DistanceField;
@@ -77,6 +78,7 @@ pub(in crate::narrow) fn contacts(
     let sampled = elements(a, b, &a_in_b, size, &mut found);
     min_translation::separate(a, b, &a_in_b, size, &sampled, &mut found);
     min_translation::remove_distant(a, b, &a_in_b, size, &mut found);
+    touching::settle([a, b], &a_in_b, size, &mut found);
     found.finish(pose_b);
 }
 
