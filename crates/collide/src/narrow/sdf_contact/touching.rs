@@ -15,8 +15,8 @@
 //! of the iteration is the closest pair of bodies that are apart, and the least translation nearby of others.
 
 use super::super::reduce::Collector;
-use super::Body;
 use super::support_plane::Placed;
+use super::{Body, BodyElements};
 use crate::distance::gjk::separation;
 use crate::sdf::OVERHANG;
 use crate::{Contact, Mat3, NormalFrom, Pose, Vec3};
@@ -26,9 +26,11 @@ const SHALLOW: f64 = 1e-2;
 /// Distance at which the direction is found, in the same unit.
 const CLEARANCE: f64 = 0.1;
 /// Rounding of gaps, in the same unit.
-const ROUNDING: f64 = 1e-11;
+const ROUNDING: f64 = 1e-10;
 /// Sine of the angle between normals that are the same.
-const SAME_NORMAL: f64 = 1e-6;
+const SAME_NORMAL: f64 = 1e-5;
+/// Difference of gaps that are the same, in radii of the smaller body.
+const SAME_GAP: f64 = 1e-8;
 /// Distance of two contacts at the same place, in radii of the smaller body.
 const SAME_PLACE: f64 = 1e-3;
 /// Cosine of the angle to the direction of the distance up to which another contact at the same gap belongs to the same surface.
@@ -40,26 +42,34 @@ const MAX_DIRECTIONS: usize = 16;
 /// the same gap with another normal.
 pub(super) fn settle([a, b]: [&Body; 2], a_in_b: &Pose, size: f64, found: &mut Collector) {
     let above = 4.0 * OVERHANG * a.radius.max(b.radius);
-    let Some(&deepest) = found.deepest().filter(|c| c.gap > -SHALLOW * size && c.gap < above) else { return };
-    if !(a.field.is_convex() && b.field.is_convex()) || a.field.is_linear() || b.field.is_linear() {
+    let least = found.min_gap();
+    if !(least > -SHALLOW * size && least < above && a.field.is_convex() && b.field.is_convex())
+        || a.field.is_linear()
+        || b.field.is_linear()
+    {
         return;
     }
     let (rotation, offset) = (*a_in_b.rotation.to_rotation_matrix().matrix(), a_in_b.translation.vector);
-    let pair = Touching { of: [a, b], rotation, offset, size };
+    let pair = Touching { of: [a, b], pose: a_in_b, rotation, offset, size };
+    let Some((mut best, gap)) = pair.furthest_apart(found.contacts(), least + above) else { return };
     let rounding = ROUNDING * size;
-    let mut best = deepest;
-    if (pair.overlap_along(&best.normal) + best.gap).abs() > rounding {
-        best = pair.contact_of_distance(&deepest);
-        let is_same =
-            |c: &Contact| c.normal.cross(&best.normal).norm() < SAME_NORMAL && (c.gap - best.gap).abs() < rounding;
-        if !found.contains_like(is_same) {
-            found.push(best);
+    if (best.gap - gap).abs() > rounding || pair.is_beside(&best) || pair.is_deepest_point(&best) {
+        let exact = pair.contact_of_distance(&best);
+        let is_same = |c: &&Contact| {
+            c.normal.cross(&exact.normal).norm() < SAME_NORMAL && (c.gap - exact.gap).abs() < SAME_GAP * size
+        };
+        match found.contacts().iter().find(is_same) {
+            Some(same) => best = *same,
+            None => {
+                best = exact;
+                found.push(exact);
+            }
         }
     }
     let is_false = |c: &Contact| {
         let in_place = (c.point - best.point).norm() < SAME_PLACE * size;
         let aligned = if in_place { 1.0 - 0.5 * SAME_NORMAL * SAME_NORMAL } else { ALIGNED };
-        c.gap < best.gap - rounding
+        c.gap < best.gap - SAME_GAP * size
             || c.gap < best.gap + above
                 && c.normal.dot(&best.normal) < aligned
                 && -pair.overlap_along(&c.normal) < best.gap - rounding
@@ -72,6 +82,7 @@ pub(super) fn settle([a, b]: [&Body; 2], a_in_b: &Pose, size: f64, found: &mut C
 /// Two convex bodies in the frame of B.
 struct Touching<'a> {
     of: [&'a Body<'a>; 2],
+    pose: &'a Pose,
     rotation: Mat3,
     offset: Vec3,
     size: f64,
@@ -82,6 +93,43 @@ impl Touching<'_> {
     fn overlap_along(&self, n: &Vec3) -> f64 {
         let [a, b] = self.of;
         b.elements.support(n) + a.elements.support(&-self.rotation.tr_mul(n)) - n.dot(&self.offset)
+    }
+
+    /// Returns the contact along whose normal the bodies are furthest apart, or overlap the least, and by how much; of
+    /// those up to a gap.
+    fn furthest_apart(&self, contacts: &[Contact], limit: f64) -> Option<(Contact, f64)> {
+        let mut best: Option<(Contact, f64)> = None;
+        for c in contacts.iter().filter(|c| c.gap <= limit) {
+            let gap = match &best {
+                Some((known, gap)) if known.normal == c.normal => *gap,
+                _ => -self.overlap_along(&c.normal),
+            };
+            if best.as_ref().is_none_or(|(known, least)| gap > *least || gap == *least && c.gap < known.gap) {
+                best = Some((*c, gap));
+            }
+        }
+        best
+    }
+
+    /// Returns whether the contact is beside the face that it is with.
+    fn is_beside(&self, c: &Contact) -> bool {
+        let [a, b] = self.of;
+        let half = 0.5 * c.gap * c.normal;
+        let outside = match c.normal_from {
+            NormalFrom::FaceOfA => a.field.bound(&self.pose.inverse_transform_point(&(c.point + half).into()).coords),
+            NormalFrom::FaceOfB => b.field.bound(&(c.point - half)),
+            _ => return false,
+        };
+        outside > ROUNDING * self.size
+    }
+
+    /// Returns whether the contact may be the deepest point of a rim, of a straight side or in one: the normal there is that
+    /// of the least translation up to the depth, in radii of curvature.
+    fn is_deepest_point(&self, c: &Contact) -> bool {
+        let is_face = matches!(c.normal_from, NormalFrom::FaceOfA | NormalFrom::FaceOfB);
+        let is_round = |body: &Body| matches!(body.elements, BodyElements::Round { .. });
+        let is_curved = self.of.iter().any(|body| body.field.is_curved()) && !self.of.iter().any(|body| is_round(body));
+        c.gap < 0.0 && is_curved && !is_face && (c.core_a == 0.0 || c.core_b == 0.0)
     }
 
     /// Returns the contact of the direction of the distance, from that of a contact nearby.
@@ -101,18 +149,15 @@ impl Touching<'_> {
             }
             let gain = overlap - there;
             (normal, overlap, on_b) = (next, there, apart.points[1]);
-            if gain < 0.1 * ROUNDING * self.size {
+            if gain < 1e-2 * ROUNDING * self.size {
                 break;
             }
         }
-        Contact {
-            point: on_b - normal * (0.5 * overlap),
-            normal,
-            gap: -overlap,
-            core_a: 0.0,
-            core_b: 0.0,
-            normal_from: NormalFrom::Edges,
-            ..*from
+        let exact = Contact { point: on_b - normal * (0.5 * overlap), normal, gap: -overlap, ..*from };
+        let is_kept = normal.dot(&from.normal) > ALIGNED && (exact.point - from.point).norm() < SAME_PLACE * self.size;
+        match is_kept && !matches!(from.normal_from, NormalFrom::FaceOfA | NormalFrom::FaceOfB) {
+            true => exact,
+            false => Contact { core_a: 0.0, core_b: 0.0, normal_from: NormalFrom::Edges, ..exact },
         }
     }
 }
