@@ -71,10 +71,10 @@ enum Carried {
 }
 
 /// Returns the rate of a normal that points from B's core point to A's, for the relative velocity
-/// of the two.
+/// of the two. Two sharp features have none: their core points meet as the gap closes, and have no direction there.
 fn turning(c: &Contact, gap: f64, relative: Vec3) -> Vec3 {
-    let distance = c.core_a + c.core_b + gap;
-    if distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
+    let (cores, distance) = (c.core_a + c.core_b, c.core_a + c.core_b + gap);
+    if cores > 0.0 && distance > 0.0 { across(relative, &c.normal) / distance } else { Vec3::zeros() }
 }
 
 /// Returns the part of `v` across a unit direction.

@@ -6,8 +6,9 @@ use nalgebra::UnitQuaternion;
 use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
-/// Largest angle between the impulses of two steppers, rad: the bodies turn by 3 rad/s until the strike.
-const SAME: f64 = 0.05;
+/// Rates of `time_stepping`, Hz, and the largest angle of its impulse to that at the time of the impact, rad: the normal is
+/// that of the start of the step, from which the bodies turn by some 3 rad/s.
+const RATES: [(f64, f64); 2] = [(240.0, 0.15), (960.0, 0.05)];
 
 /// A generator of numbers from -1 to 1: Knuth's linear congruence.
 struct Numbers(u64);
@@ -83,13 +84,13 @@ fn sharp_bodies_strike_along_the_normal_of_their_distance() {
         for seed in 0..seeds {
             let exact = first_impulse(names, seed, ("backtracking", Integrator::DormandPrince), 1.0 / 480.0);
             let Some(exact) = exact else { continue };
-            for hertz in [240.0, 960.0] {
+            for (hertz, most) in RATES {
                 let Some(found) = first_impulse(names, seed, ("time_stepping", Integrator::Verlet), 1.0 / hertz) else {
                     continue;
                 };
                 strikes += 1;
                 let off = found.cross(&exact).norm().atan2(found.dot(&exact));
-                if off > SAME {
+                if off > most {
                     wrong.push(format!("{names:?}, seed {seed}, {hertz} Hz: {off:.2} rad"));
                 }
             }

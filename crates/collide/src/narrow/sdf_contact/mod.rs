@@ -6,6 +6,8 @@
 //! core           the same for the points and axes of rounded bodies, minus their radius
 //! ```
 //!
+//! Two convex bodies that all but touch with sharp features have the direction of their distance ([`touching`]).
+//!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed
 //! distance field collision* (2020). Departure: faces are searched only in deep overlaps
 //! ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.

@@ -43,7 +43,9 @@ const MAX_DIRECTIONS: usize = 16;
 pub(super) fn settle([a, b]: [&Body; 2], a_in_b: &Pose, size: f64, found: &mut Collector) {
     let above = 4.0 * OVERHANG * a.radius.max(b.radius);
     let least = found.min_gap();
-    if !(least > -SHALLOW * size && least < above && a.field.is_convex() && b.field.is_convex())
+    // the elements of two curved sides may miss the closest place
+    let is_near = least < above || a.mesh.is_none() && b.mesh.is_none();
+    if !(least > -SHALLOW * size && is_near && a.field.is_convex() && b.field.is_convex())
         || a.field.is_linear()
         || b.field.is_linear()
     {
