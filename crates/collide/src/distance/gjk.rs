@@ -77,7 +77,7 @@ struct Nearest {
 
 /// Returns the distance of two convex bodies. The search ends early where the lower bound exceeds
 /// `enough` meters. `start` is a guess of the vector from B to A.
-pub(super) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough: f64) -> Separation {
+pub(crate) fn separation(a: &impl Convex, b: &impl Convex, start: &Vec3, enough: f64) -> Separation {
     separation_within(a, b, start, enough, 0.0)
 }
 

@@ -108,6 +108,11 @@ impl<'a> Collector<'a> {
         self.out[self.start..].iter().any(like)
     }
 
+    /// Returns the contacts collected.
+    pub fn contacts(&self) -> &[Contact] {
+        &self.out[self.start..]
+    }
+
     /// Returns the smallest gap collected.
     pub fn min_gap(&self) -> f64 {
         self.out[self.start..].iter().map(|c| c.gap).fold(f64::INFINITY, f64::min)

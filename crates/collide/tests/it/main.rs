@@ -31,6 +31,7 @@ mod medial;
 mod mesh_contacts;
 mod mesh_files;
 mod meshes;
+mod near_touching;
 mod open_mesh;
 mod overlaps;
 mod pairs;

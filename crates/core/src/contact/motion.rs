@@ -24,6 +24,7 @@ use super::detect::ContactConstraint;
 use crate::object::collidable::ContactFrame;
 use crate::object::part_state::PartState;
 use crate::world::Core;
+use nalgebra::{ComplexField, RealField};
 use tumble_collide::{Contact, Mat3, NormalFrom, Shape, Vec3};
 
 /// Rates of a contact's normal and point, world axes.
@@ -65,6 +66,8 @@ impl Moved {
 /// Maximum angle by which the normal of a contact that lasts turns, rad: an edge that slides past a corner has
 /// a contact for a moment.
 const MAX_TURN: f64 = 0.5;
+/// A smaller radius of curvature, in parts of the mean one, is that of a sharp feature.
+const SHARP: f64 = 1e-9;
 
 /// The object that carries a part.
 #[derive(Clone, Copy)]
@@ -87,19 +90,23 @@ enum Carried {
 }
 
 /// Returns the rate of a normal that points from B's core point to A's, for the relative velocity of the two, the sum of
-/// their radii and of the gap, and the sum of their other curvatures.
-fn turning(normal: &Vec3, relative: Vec3, distance: f64, more: Option<Mat3>) -> Vec3 {
+/// their core radii and the gap, m, and the sum of their other curvatures. Features that are sharp in a direction have none
+/// there: their core points meet as the gap closes.
+fn turning(normal: &Vec3, relative: Vec3, (cores, gap): (f64, f64), more: Option<Mat3>) -> Vec3 {
     let Some(more) = more else {
-        return if distance > 0.0 { across(relative, normal) / distance } else { Vec3::zeros() };
+        let turns = cores > 0.0 && cores + gap > 0.0;
+        return if turns { across(relative, normal) / (cores + gap) } else { Vec3::zeros() };
     };
     let [_, t, b] = ContactFrame::new(Vec3::zeros(), *normal).axes;
-    let (tt, tb, bb) = (t.dot(&(more * t)) + distance, t.dot(&(more * b)), b.dot(&(more * b)) + distance);
-    let (along, across, determinant) = (t.dot(&relative), b.dot(&relative), tt * bb - tb * tb);
-    if determinant > 0.0 {
-        (t * (bb * along - tb * across) + b * (tt * across - tb * along)) / determinant
-    } else {
-        Vec3::zeros()
-    }
+    let (tt, tb, bb) = (t.dot(&(more * t)), t.dot(&(more * b)), b.dot(&(more * b)));
+    let angle = 0.5 * RealField::atan2(2.0 * tb, tt - bb);
+    let (sin, cos) = ComplexField::sin_cos(angle);
+    let (mean, half) = (0.5 * (tt + bb), ComplexField::hypot(0.5 * (tt - bb), tb));
+    let along = |axis: Vec3, radius: f64| {
+        let turns = radius + cores > SHARP * mean && radius + cores + gap > 0.0;
+        if turns { axis * (axis.dot(&relative) / (radius + cores + gap)) } else { Vec3::zeros() }
+    };
+    along(cos * t + sin * b, mean + half) + along(cos * b - sin * t, mean - half)
 }
 
 /// Returns the part of `v` across a unit direction.
@@ -123,7 +130,7 @@ impl ContactConstraint {
             |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: va - on_a.rate(&n_rate), side: -0.5 };
         let with_b =
             |n_rate: Vec3| ContactMotion { normal_rate: n_rate, point_rate: vb + on_b.rate(&n_rate), side: 0.5 };
-        let (distance, more) = (on_a.core + on_b.core + gap, on_a.more_with(&on_b));
+        let (distance, more) = ((on_a.core + on_b.core, gap), on_a.more_with(&on_b));
         let line = |along: &Vec3, owner: &PartState| {
             let rolls = along * along.dot(&owner.angular_velocity.cross(n));
             let relative = va - vb - more.map_or(Vec3::zeros(), |more| more * rolls);

@@ -98,6 +98,7 @@ mod sensors;
 mod shape_filters;
 mod shape_materials;
 mod shape_names;
+mod sharp_impacts;
 mod sleep;
 mod slides;
 mod smooth_shapes;

@@ -6,6 +6,8 @@
 //! core           the same for the points and axes of rounded bodies, minus their radius
 //! ```
 //!
+//! Two convex bodies that all but touch with sharp features have the direction of their distance ([`touching`]).
+//!
 //! Source for elements against fields: Macklin et al., *Local optimization for robust signed
 //! distance field collision* (2020). Departure: faces are searched only in deep overlaps
 //! ([`mesh_convex_depth`], [`mesh_mesh_depth`]), since edges and vertices of both bodies are exact.
@@ -23,6 +25,7 @@ mod rim;
 mod smooth;
 mod support_plane;
 mod tolerances;
+mod touching;
 
 use super::reduce::Collector;
 use crate::sdf::DistanceField;
@@ -77,6 +80,7 @@ pub(in crate::narrow) fn contacts(
     let sampled = elements(a, b, &a_in_b, size, &mut found);
     min_translation::separate(a, b, &a_in_b, size, &sampled, &mut found);
     min_translation::remove_distant(a, b, &a_in_b, size, &mut found);
+    touching::settle([a, b], &a_in_b, size, &mut found);
     found.finish(pose_b);
 }
 

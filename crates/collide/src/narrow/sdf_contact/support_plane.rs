@@ -64,10 +64,10 @@ fn is_polytope(body: &Body) -> bool {
 }
 
 /// A body at a pose.
-struct Placed<'a> {
-    elements: &'a BodyElements<'a>,
-    rotation: Mat3,
-    offset: Vec3,
+pub(super) struct Placed<'a> {
+    pub elements: &'a BodyElements<'a>,
+    pub rotation: Mat3,
+    pub offset: Vec3,
 }
 
 impl Convex for Placed<'_> {
