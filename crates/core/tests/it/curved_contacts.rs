@@ -106,3 +106,40 @@ fn contacts_that_run_over_curved_surfaces_take_no_energy() {
         }
     }
 }
+
+/// Energy of an ellipsoid after 0.4 s, of which it has fallen obliquely on a plane, J.
+fn after_a_fall(stepper: &str, rate: f64) -> f64 {
+    let exact = stepper == "dp";
+    let mut world = world(if exact { "backtracking" } else { stepper }, 1.0 / rate);
+    if exact {
+        let settings = world.settings().with_integrator(Integrator::DormandPrince);
+        world.set_settings(settings).unwrap();
+    }
+    world.add_static(RigidBody::fixed(Shape::half_space()).with_material(smooth())).unwrap();
+    let turn = UnitQuaternion::from_scaled_axis(0.9 * Vector3::new(1.0, 2.0, 0.5).normalize());
+    let body =
+        RigidBody::new(Shape::ellipsoid(Vec3::new(0.5, 0.3, 0.25)).unwrap()).with_mass(6.0).with_material(smooth());
+    let body = body.with_pose(Pose::from_parts(Vec3::new(0.0, 0.0, 0.6).into(), turn));
+    let body = body.with_velocity(Vec3::new(0.9, -1.4, -3.0)).with_angular_velocity(Vec3::new(-5.0, -0.9, -3.3));
+    world.add(body).unwrap();
+    (0..(0.4 * rate).round() as usize).for_each(|_| {
+        world.step().unwrap();
+    });
+    world.energy().total()
+}
+
+#[test]
+fn an_ellipsoid_that_strikes_obliquely_approaches_its_energy() {
+    let exact = after_a_fall("dp", 960.0);
+    for (stepper, rate, most) in [
+        ("time_stepping", 60.0, 0.4),
+        ("time_stepping", 240.0, 0.06),
+        ("time_stepping", 960.0, 2e-3),
+        ("backtracking", 240.0, 2e-3),
+        ("backtracking", 960.0, 2e-5),
+    ] {
+        let error = after_a_fall(stepper, rate) / exact - 1.0;
+        println!("{stepper} at {rate} Hz: {error:.1e} of {exact:.3} J");
+        assert!(error.abs() < most, "{stepper} at {rate} Hz: {error}");
+    }
+}
