@@ -43,6 +43,7 @@ mod events;
 mod extrapolated_impacts;
 mod filtered_edges;
 mod free;
+mod forks;
 mod friction;
 mod hulls;
 mod impacts;
