@@ -43,9 +43,7 @@ const MAX_DIRECTIONS: usize = 16;
 pub(super) fn settle([a, b]: [&Body; 2], a_in_b: &Pose, size: f64, found: &mut Collector) {
     let above = 4.0 * OVERHANG * a.radius.max(b.radius);
     let least = found.min_gap();
-    // the elements of two curved sides may miss the closest place
-    let is_near = least < above || a.mesh.is_none() && b.mesh.is_none();
-    if !(least > -SHALLOW * size && is_near && a.field.is_convex() && b.field.is_convex())
+    if !(least > -SHALLOW * size && least < above && a.field.is_convex() && b.field.is_convex())
         || a.field.is_linear()
         || b.field.is_linear()
     {
@@ -139,7 +137,7 @@ impl Touching<'_> {
         let [a, b] = self.of;
         let of_b = Placed { elements: &b.elements, rotation: Mat3::identity(), offset: Vec3::zeros() };
         let (mut normal, mut overlap) = (from.normal, self.overlap_along(&from.normal));
-        let mut on_b = from.point;
+        let mut on_b = from.point - from.normal * (0.5 * from.gap);
         for _ in 0..MAX_DIRECTIONS {
             let shift = normal * (overlap + CLEARANCE * self.size);
             let of_a = Placed { elements: &a.elements, rotation: self.rotation, offset: self.offset + shift };
