@@ -274,7 +274,7 @@ impl Backtracking {
         blocks.iter().zip(&work.targets).any(stiff)
     }
 
-    /// Writes the role of every contact in the sub-step.
+    /// Writes the role of every contact in the sub-step. Those of limits follow in the solve for contact forces.
     fn roles(&mut self, core: &Core) {
         let s = &core.settings;
         let role = |constraint: &ContactConstraint| {
@@ -291,6 +291,8 @@ impl Backtracking {
             let allowed = allowed.max(-constraint.contact.gap + s.contact_tolerance);
             Role { lasts, touching, opens: speed >= STILL, allowed }
         };
+        self.watch.limits.clear();
+        self.watch.guesses.clear();
         self.watch.roles.clear();
         self.watch.roles.extend(self.work.contact_constraints.iter().map(role));
     }

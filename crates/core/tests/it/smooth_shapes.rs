@@ -56,8 +56,11 @@ fn a_rocking_ellipsoid_has_the_period_of_its_curvature() {
             measured / exact - 1.0
         });
         println!("{stepper}: period {exact:.6} s, relative errors {errors:?}");
-        // the amplitude adds about 8·tilt²
-        assert!(errors[1].abs() < 0.4 * errors[0].abs() && errors[2].abs() < 2e-5, "{stepper}: {errors:?}");
+        // the amplitude adds about 8·tilt²; the leapfrog has −(ω·h)²/24
+        let leapfrog = |rate: f64| -(std::f64::consts::TAU / exact / rate).powi(2) / 24.0;
+        let factor = if stepper == "backtracking" { 1.5 } else { 1.1 };
+        let most = [60.0, 120.0, 240.0].map(|rate| factor * leapfrog(rate).abs() + 2e-5);
+        assert!(errors.iter().zip(most).all(|(error, most)| error.abs() < most), "{stepper}: {errors:?}");
     }
 }
 
@@ -196,8 +199,7 @@ fn a_rounded_box_rolls_over_its_edge() {
 /// the energy is kept.
 #[test]
 fn a_spinning_stone_keeps_its_energy() {
-    for spin in [-5.0, 5.0] {
-        let rate = 1920.0;
+    let worst = |spin: f64, rate: f64| {
         let mut world = world("time_stepping", 1.0 / rate);
         let material = floor(&mut world, 10.0);
         let inertia = Mat3::new(2e-4, -2e-5, 0.0, -2e-5, 16e-4, 0.0, 0.0, 0.0, 17e-4);
@@ -216,7 +218,11 @@ fn a_spinning_stone_keeps_its_energy() {
             world.step().unwrap();
             worst = worst.max((world.energy().total() / start - 1.0).abs());
         }
-        println!("spin {spin}: energy within {worst:e}");
-        assert!(worst < 1e-3, "{spin}: {worst}");
-    }
+        println!("spin {spin} at {rate} Hz: energy within {worst:e}");
+        worst
+    };
+    // it begins to rock, and turns about: the error is of second order
+    let [coarse, fine] = [1920.0, 3840.0].map(|rate| worst(-5.0, rate));
+    assert!(coarse > 3.5 * fine && fine < 1.5e-3, "{coarse}, {fine}");
+    assert!(worst(5.0, 960.0) < 2e-5);
 }
