@@ -67,7 +67,7 @@ mod tests {
         let half = Vec3::new(0.5, 0.3, 0.25);
         let at = |n: &Vec3| ellipsoid::support_point(&half, n);
         let n = Vec3::new(0.3, -0.5, 0.8).normalize();
-        let shape = Shape::ellipsoid(half).unwrap();
+        let shape = Shape::ellipsoid(2.0 * half).unwrap();
         check(&shape, &n, &at);
         let circle = |n: &Vec3, z: f64| Vec3::new(n.x, n.y, 0.0) * (0.2 / n.xy().norm()) + Vec3::z() * z;
         check(&Shape::cylinder(0.2, 0.6).unwrap(), &n, &|n| circle(n, 0.3));

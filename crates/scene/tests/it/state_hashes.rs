@@ -50,14 +50,14 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "fa6178513e41a74b";
-    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "e1022f58f8a5f43a";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "01b7a31ae78bf8a6";
+    bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "fadbe58c3fd1d0c3";
     chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
     chain_backtracking: "chain", Backtracking, "e95b2c5fd7a05d9c", "209fc1911104a1b4";
-    falling_time_stepping: "falling", TimeStepping, "817849ff17bbd44b", "eceefdd6f90fa94d";
+    falling_time_stepping: "falling", TimeStepping, "8cda3ff70cb1181e", "a0a3e89d897e9808";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "8b5c954758f04b2b", "dd8295e6e99189ae";
+    falling_backtracking: "falling", Backtracking, "d32d06cb04110657", "94b750c1b8b2d96d";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
@@ -67,7 +67,7 @@ table! {
     robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "ab1a03e9bd8ec5bb";
     robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c622c65d53ec29f0";
     skeleton_time_stepping: "skeleton", TimeStepping, "e4e23c0c3f5d9795", "aba735043a95bb06";
-    skeleton_backtracking: "skeleton", Backtracking, "234d5163e48e0e96", "228be6bedd425941";
+    skeleton_backtracking: "skeleton", Backtracking, "13874effa4b90c9b", "7ce4a84ccde79dd4";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }
@@ -91,7 +91,7 @@ table! {
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
-    arch_time_stepping: "arch", TimeStepping, "e7322f16bab45164", "17736b4a409409d7";
+    arch_time_stepping: "arch", TimeStepping, "7defd295d446fda8", "368220ae959f1b1e";
     walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "6e69fb4e45ddca89";
     wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "dd93b3ba2f28eb55";
     mechanism_time_stepping: "mechanism", TimeStepping, "693bdfa98885bbc3", "2c657dfd986eeb83";
@@ -103,7 +103,7 @@ table! {
     cloth_time_stepping: "cloth", TimeStepping, "193dfd785230acaf", "b77a063e154a12ca";
     cloth_backtracking: "cloth", Backtracking, "193dfd785230acaf", "b77a063e154a12ca";
     jelly_time_stepping: "jelly", TimeStepping, "58432d5e1831dfb4", "6d8fb706aa558611";
-    arch_backtracking: "arch", Backtracking, "52e11fa57b32a879", "43819e958609f0f5";
+    arch_backtracking: "arch", Backtracking, "19376406abf1fe22", "ca6590afa76c49b0";
     dominoes_backtracking: "dominoes", Backtracking, "4aff9d4f589e8417", "7b6644db6277f1cf";
     walker_backtracking: "walker", Backtracking, "55963c311462ad4e", "88379ffebfbc3908";
     mechanism_backtracking: "mechanism", Backtracking, "4fab6d90e389a76f", "5b7159a9936cb74d";
