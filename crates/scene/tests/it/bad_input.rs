@@ -624,7 +624,9 @@ fn pairs() {
     );
     assert_errors(
         &pair("materials = [\"ice\", \"ice\"]\n"),
-        &["s.toml:6:1: pair 1 has no `friction`; expected `restitution`, `friction`, `collides` or several of them"],
+        &[
+            "s.toml:6:1: pair 1 has no `friction`; expected `restitution`, `friction`, `rolling_friction_m`, `torsional_friction_m`, `collides` or several of them",
+        ],
     );
     let twice = "materials = [\"ice\", \"ice\"]\nfriction = 0.1\n";
     assert_errors(
