@@ -4,6 +4,7 @@ use super::{Backtracking, FLOOR, is_soft};
 use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
+use crate::object::Level;
 use crate::sensor::loads::SubstepForces;
 use crate::solver::SolverSettings;
 use crate::step::adhesion::adhere;
@@ -77,7 +78,16 @@ impl Backtracking {
         whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
         let budget = core.meter.left(IMPACTS);
+        // rows of limits are those of the middle of the sub-step: what turns towards them until then is no impact
+        let bias = work.bias.clone();
+        if let Level::Acceleration { h, .. } = self.level {
+            let limits = work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets);
+            for (block, target) in limits.filter(|(_, target)| target.set == RowSet::HalfLine) {
+                work.bias[block.row as usize] -= 0.5 * h * target.bias_acceleration;
+            }
+        }
         impact::resolve(core, work, &candidates, (IMPACT_PASSES, true, budget), &mut u, &mut total);
+        work.bias = bias;
         let mut impacts = Impacts::None;
         if total.iter().any(|l| *l != 0.0) {
             impacts = if self.has_new(core, &total) { Impacts::New } else { Impacts::Slow };
@@ -181,7 +191,7 @@ impl Backtracking {
         if adhesion.iter().any(|du| *du != 0.0) {
             work.rows.add_velocity(&adhesion, &mut work.c);
         }
-        self.watch_limits(core, &velocity, &mut keep);
+        self.watch_limits(core, (&velocity, left), &mut keep);
         let work = &mut self.work;
         let contact_constraints = work.contact_constraints.len();
         for (i, target) in work.targets.iter().enumerate() {
@@ -244,9 +254,9 @@ impl Backtracking {
     }
 
     /// Assigns the roles of limits: those with a reported gap are active from the time at which
-    /// they are reached, others over the whole sub-step. `velocity` has the velocities of the rows,
-    /// `work.c` their accelerations.
-    fn watch_limits(&mut self, core: &Core, velocity: &[f64], keep: &mut [bool]) {
+    /// they are reached, others over the whole sub-step, of `left` seconds. `velocity` has the velocities of the rows, which are
+    /// those of its middle, `work.c` their accelerations.
+    fn watch_limits(&mut self, core: &Core, (velocity, left): (&[f64], f64), keep: &mut [bool]) {
         let (work, contact_constraints, watch) = (&self.work, self.work.contact_constraints.len(), &mut self.watch);
         watch.limits.clear();
         let mut located = vec![false; work.targets.len()];
@@ -254,7 +264,8 @@ impl Backtracking {
             let (mut rate, mut acceleration) = (0.0, 0.0);
             if let Some(i) = limit.target.map(|i| i as usize) {
                 let row = work.rows.blocks[contact_constraints + i].row as usize;
-                (rate, acceleration) = (velocity[row], work.c[row] + work.targets[i].bias_acceleration);
+                let bias = work.targets[i].bias_acceleration;
+                (rate, acceleration) = (velocity[row] - 0.5 * left * bias, work.c[row] + bias);
             }
             let role = LimitRole::new(limit, rate, acceleration, &core.settings);
             if let Some(i) = limit.target.map(|i| i as usize) {
