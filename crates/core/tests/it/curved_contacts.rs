@@ -76,7 +76,19 @@ fn change(moving: &Curved, fixed: &Curved, stepper: &str, rate: f64) -> f64 {
         world.step().unwrap();
     });
     assert!(world.contacts().iter().any(|c| c.a == id || c.b == id), "it stays in contact");
-    (world.energy().total() - before) / kinetic
+    let change = (world.energy().total() - before) / kinetic;
+    println!("{:?}, {stepper} at {rate} Hz: {change:.1e}", [&moving.shape, &fixed.shape].map(name));
+    change
+}
+
+fn name(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Ellipsoid { .. } => "ellipsoid",
+        Shape::Cone { .. } => "cone",
+        Shape::RoundedCylinder { .. } => "rounded cylinder",
+        Shape::Cylinder(_) => "cylinder",
+        _ => "ball",
+    }
 }
 
 #[test]
@@ -93,14 +105,15 @@ fn contacts_that_run_over_curved_surfaces_take_no_energy() {
         ("ball on cylinder", ball(), cylinder(), 2e-8),
     ] {
         let of = |stepper: &str, rate: f64| change(&moving, &fixed, stepper, rate).abs();
+        of("time_stepping", 60.0);
         let steps = [240.0, 480.0, 960.0].map(|rate| of("time_stepping", rate));
         let second_order = steps[0] > 2.9 * steps[1] && steps[1] > 2.9 * steps[2] && steps[2] < 2e-4;
         assert!(second_order, "{name}, time_stepping at 240, 480, 960 Hz: {steps:?}");
-        for (rate, most) in [(120.0, 1e-3), (240.0, 1e-4), (960.0, 3e-5)] {
+        for (rate, most) in [(60.0, 5e-3), (120.0, 1e-3), (240.0, 1e-4), (960.0, 3e-5)] {
             let found = of("backtracking", rate);
             assert!(found < most, "{name}, backtracking at {rate} Hz: {found:e}");
         }
-        for rate in [60.0, 240.0, 960.0] {
+        for rate in [60.0, 120.0, 240.0, 960.0] {
             let found = of("dp", rate);
             assert!(found < exact, "{name}, dormand_prince at {rate} Hz: {found:e}");
         }
