@@ -57,6 +57,11 @@ impl Pictures {
         self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    #[cfg(test)]
+    pub fn holders(&self) -> usize {
+        Arc::strong_count(&self.0)
+    }
+
     /// The painter's side: delivers a picture. First waits until the session has taken the last one, if it
     /// has asked for it.
     pub fn put(&self, frame: u64, burn_in: bool, picture: Result<Picture, String>) {

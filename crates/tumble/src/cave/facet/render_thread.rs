@@ -4,7 +4,8 @@
 use super::pictures::{Picture, Pictures};
 use crate::cave::run_setup::{PREVIEW, RunSetup, apply_viewer};
 use crate::failure::Failure;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread::JoinHandle;
 use std::time::Duration;
 use tumble::dynamics::World;
 use tumble::net::sync::Viewer;
@@ -86,6 +87,7 @@ const END_TIMEOUT: Duration = Duration::from_secs(3);
 /// thread releases its device calls functions of a driver that is unloaded meanwhile.
 struct PainterEnd {
     closed: Receiver<()>,
+    thread: Option<JoinHandle<()>>,
     /// All that it delivers.
     pictures: Vec<Pictures>,
 }
@@ -93,7 +95,10 @@ struct PainterEnd {
 impl Drop for PainterEnd {
     fn drop(&mut self) {
         self.pictures.iter().for_each(Pictures::abandon);
-        let _ = self.closed.recv_timeout(END_TIMEOUT); // a device that hangs ends with the process
+        let released = self.closed.recv_timeout(END_TIMEOUT) == Err(RecvTimeoutError::Disconnected);
+        if released && let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panic of its own is already printed
+        } // a device that hangs ends with the process
     }
 }
 
@@ -129,7 +134,7 @@ impl RenderThread {
         let (requests, incoming) = sync_channel::<RenderRequest>(1);
         let (ready, started) = sync_channel(1);
         let (ends, end) = sync_channel(1);
-        std::thread::Builder::new()
+        let thread = std::thread::Builder::new()
             .name("painter".into())
             .spawn(move || {
                 let _ends: SyncSender<()> = ends; // dropped last, after all that has the device
@@ -145,7 +150,7 @@ impl RenderThread {
                 render_all(view, &canvases, &mut renderer, &incoming);
             })
             .map_err(|e| Failure::run("drawing", e))?;
-        let end = PainterEnd { closed: end, pictures: all.clone() };
+        let end = PainterEnd { closed: end, thread: Some(thread), pictures: all.clone() };
         let (software, adapter) =
             started.recv().map_err(|e| Failure::run("drawing", e))?.map_err(|e| Failure::run("drawing", e))?;
         // as in windows: a software driver is slow
@@ -264,17 +269,11 @@ mod tests {
         let scene = SceneFile::parse("[[light]]\ntype = \"directional\"\ndirection = [0, 0, -1]\n", "light").unwrap();
         let surroundings = CaveSceneOptions { cave: "cube4".into(), environment: None };
         let setup = RunSetup::load(scene, &surroundings, Role::Facet).ok().unwrap();
-        let painters = || {
-            let threads = std::fs::read_dir("/proc/self/task").unwrap().flatten();
-            threads
-                .filter_map(|t| std::fs::read_to_string(t.path().join("comm")).ok())
-                .filter(|n| n == "painter\n")
-                .count()
-        };
         let facets = &setup.cave.facets[..1];
         let thread = RenderThread::new(&setup, facets, Some(Quality::fastest()), DebugDraw::default()).ok().unwrap();
-        assert!(painters() > 0, "with the threads of a software driver, which have its name");
+        let pictures = thread.pictures.clone();
+        assert!(pictures.holders() > 1, "the painter holds them as long as the device");
         drop(thread);
-        assert_eq!(painters(), 0);
+        assert_eq!(pictures.holders(), 1);
     }
 }
