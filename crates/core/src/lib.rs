@@ -71,7 +71,7 @@ pub use object::visual::{Drawn, Visual, VisualGeometry, VisualMesh};
 pub use object::{
     Appearance, CameraCarrier, Cloud, CloudSphere, Collidable, Combine, Constraint, Energy, ForceGenerator, Fork,
     FrameState, Integratable, Intersect, Level, LightCarrier, Material, Momentum, MomentumKind, NetSync, Object,
-    PartSurface, Renderable, RowTarget, ShapeFilter, ShapeFilters, ShapeMaterials, SyncError, shape_meeting,
+    PartSurface, Renderable, RowTarget, ShapeFilter, ShapeFilters, ShapeMaterials, SpringRow, SyncError, shape_meeting,
 };
 pub use report::{StepReport, UnreachableJoint, WorstSolve};
 pub use rigid::{BodyError, LockedAxes, RigidBody};

@@ -371,7 +371,7 @@ impl NarrowPhase<'_> {
             let [of_a, of_b] = [body_a.material(part_a).id, body_b.material(part_b).id];
             pair_materials.ignores((owner_a.id, part_a, of_a), (owner_b.id, part_b, of_b))
         };
-        if filtered.is_none() && !pair_materials.is_empty() && ignored() {
+        if filtered.is_none() && !pair_materials.ignores_none() && ignored() {
             return;
         }
         let mode = body_a.contact_mode(part_a).of_pair(body_b.contact_mode(part_b));

@@ -4,7 +4,7 @@
 use crate::object::Material;
 use crate::settings::{Settings, SettingsError};
 use crate::world::view::ObjectId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One side of a pair with surface constants of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,12 +66,19 @@ pub(crate) type Surface<'a> = (ObjectId, usize, &'a Material);
 /// A part, with [`Material::id`] of one of its shapes.
 pub(crate) type SurfaceName = (ObjectId, usize, u32);
 
+fn in_order(mut parts: [(ObjectId, usize); 2]) -> [(ObjectId, usize); 2] {
+    parts.sort_unstable();
+    parts
+}
+
 /// The chosen pairs of a world. Which side is named first makes no difference.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PairMaterials {
     entries: BTreeMap<[PairSide; 2], PairMaterial>,
     /// Whether an entry that names a material decides whether its sides collide.
     select_by_material: bool,
+    /// Parts that joints hold together: they collide only if an entry says so.
+    joined: BTreeSet<[(ObjectId, usize); 2]>,
 }
 
 impl PairMaterials {
@@ -130,14 +137,25 @@ impl PairMaterials {
         }
     }
 
-    /// Returns whether a chosen pair keeps two surfaces from colliding.
+    /// Returns whether a chosen pair, or else a joint, keeps two surfaces from colliding.
     pub fn ignores(&self, a: SurfaceName, b: SurfaceName) -> bool {
-        !self.is_empty() && self.of(a, b).collides == Some(false)
+        let chosen = if self.entries.is_empty() { None } else { self.of(a, b).collides };
+        chosen.map_or_else(|| self.joined.contains(&in_order([(a.0, a.1), (b.0, b.1)])), |collides| !collides)
     }
 
-    /// Returns whether no pair has constants of its own.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+    /// Returns whether no two surfaces are kept from colliding.
+    pub fn ignores_none(&self) -> bool {
+        self.entries.is_empty() && self.joined.is_empty()
+    }
+
+    /// Adds two parts that a joint holds together.
+    pub fn join(&mut self, parts: [(ObjectId, usize); 2]) {
+        self.joined.insert(in_order(parts));
+    }
+
+    /// Forgets all joints.
+    pub fn part_all(&mut self) {
+        self.joined.clear();
     }
 
     /// A part goes before its object, and that before its material; between entries that name a

@@ -74,6 +74,11 @@ pub trait Constraint {
         let _ = out;
         false
     }
+    /// Returns two parts that it holds together. They do not collide, unless a
+    /// [`PairMaterial`](crate::PairMaterial) says so.
+    fn joined_parts(&self) -> Option<[(ObjectId, usize); 2]> {
+        None
+    }
     /// Returns whether its rows act on the object itself alone. Such rows are left out while
     /// impulses do not move the object: a kinematic object may pass its own limits.
     fn on_itself(&self) -> bool {
@@ -101,8 +106,8 @@ pub struct RowTarget {
     /// if the row's direction is constant.
     pub bias_acceleration: f64,
     /// Compliance `R` of the row, at least 0, in `w = c + (K + R)·λ`. In (m/s)/(N·s); at the
-    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: it takes part in no impact
-    /// and in no position correction.
+    /// acceleration level (m/s²)/N. 0 is rigid. A soft row is a spring: it takes part in no impact,
+    /// and has no error to correct.
     ///
     /// An implicit PD drive `F = kp·(q* − q⁺) + kd·(v* − v⁺)` with `q⁺ = q + h·v⁺` is
     /// `compliance = 1/(h·(kd + h·kp))` with the target velocity
@@ -115,12 +120,37 @@ pub struct RowTarget {
     /// Whether the row is an inertia `1/R` that resists changes of its velocity: its target is the velocity before, and it
     /// takes part in impacts.
     pub inertial: bool,
+    /// The spring whose row it is, if the rate of its extension is the row's velocity.
+    pub spring: Option<SpringRow>,
+}
+
+/// A spring with a row by the implicit midpoint rule.
+///
+/// Where bodies turn, the extension at the end of a step is not the one by the rule, and is corrected as far as the spring is
+/// stiff for the step. A stiff spring that is damped becomes implicit up to the backward Euler method (`step/springs.rs`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpringRow {
+    /// Extension, m or rad; its rest is at 0.
+    pub extension: f64,
+    /// Stiffness, N/m or N·m/rad, above 0.
+    pub stiffness: f64,
+    /// Damping beside it, whose row is another one, N·s/m or N·m·s/rad.
+    pub damping: f64,
 }
 
 impl RowTarget {
     /// Makes a rigid row with target velocity 0 and the given set and position error.
     pub fn new(set: RowSet, error: f64) -> RowTarget {
-        RowTarget { set, error, velocity: 0.0, bias_acceleration: 0.0, compliance: 0.0, share: 1.0, inertial: false }
+        RowTarget {
+            set,
+            error,
+            velocity: 0.0,
+            bias_acceleration: 0.0,
+            compliance: 0.0,
+            share: 1.0,
+            inertial: false,
+            spring: None,
+        }
     }
 
     /// Makes a row that adds an inertia to the bodies along its velocity, such as that of a rotor, kg or kg·m², above 0.

@@ -27,7 +27,7 @@ pub(crate) mod visual;
 pub use appearance::Appearance;
 pub use collidable::Collidable;
 pub use conserved::{Energy, Momentum};
-pub use constraint::{Constraint, Level, RowTarget};
+pub use constraint::{Constraint, Level, RowTarget, SpringRow};
 pub use deforming::{Cloud, CloudSphere, PartSurface};
 pub use force::ForceGenerator;
 pub use frame_state::FrameState;

@@ -238,6 +238,10 @@ impl Backtracking {
             // a rotor divides soft forces with the bodies, so they are rows too
             _ if self.work.targets.iter().any(|t| t.inertial) => Some(0.5 * left),
             Integrator::Verlet => Some(0.5 * left),
+            // forces of joints hold over the sub-step: a spring that changes in it would leave them behind, and make energy
+            Integrator::Rk4 | Integrator::DormandPrince if self.work.targets.iter().any(correction::is_joint) => {
+                Some(0.5 * left)
+            }
             _ => None,
         };
         core.implicit = soft.is_some();

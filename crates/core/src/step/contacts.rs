@@ -7,6 +7,7 @@ use super::correction::{self, Frictionless};
 use super::islands::each_island;
 use super::patch::PatchMoment;
 use super::solves::Solves;
+use super::springs;
 use crate::constraint::builder::{RowBuilder, RowKind, constraints};
 use crate::constraint::rows::{RowSet, Rows};
 use crate::contact::detect::{ContactConstraint, Detector, Owner, PartTable};
@@ -194,12 +195,19 @@ pub(crate) fn build_rows(
     core.moments.push(middle);
     let mut present = Vec::new();
     if work.targets.iter().any(correction::is_joint) {
-        let (errors, made) = correction::middle(core, acting.as_deref_mut(), level, ahead)?;
+        let (targets, made) = correction::middle(core, acting.as_deref_mut(), level, ahead)?;
         adopt(core.basis(acting.as_deref_mut(), time, None), work, made);
-        present = errors;
+        present = targets;
+    } else if springs::any_stiff(work) {
+        let mut layout = Workspace::default();
+        lay_rows(core.basis(None, time, None), &mut layout, level)?;
+        present = layout.targets;
     }
     if present.len() == work.targets.len() {
-        work.targets.iter_mut().zip(present).for_each(|(target, error)| target.error = error);
+        for (target, present) in work.targets.iter_mut().zip(present) {
+            (target.error, target.spring) = (present.error, present.spring);
+        }
+        springs::make_implicit(work, level);
     } else {
         present_errors(core.coordinates(acting), work, ahead);
     }

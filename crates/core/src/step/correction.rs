@@ -13,6 +13,7 @@
 //! | limit (half-line) | while active: violated, or with a force in the step | measured at `x` |
 //! | contact (half-line) | in the first round (`overlap.rs`) | to first order |
 //! | inertia (soft) | always: it is part of `M` | none |
+//! | stiff spring (soft) | always: it is part of `M` | extension, less that by its rule |
 //!
 //! All callers use this one routine: the middle of a step ([`middle`]), its end in both steppers,
 //! and overlap of bodies in place ([`correct`]). All linear problems go to the solver of the world.
@@ -26,6 +27,8 @@
 //! energy oscillates with the motion and is not lost in the joints. This requires a middle *on* the
 //! joints, and so do redundant joints: two hinges of a door agree about its axis in closed
 //! configurations only, and rows beside one would lock the door.
+//!
+//! **Stiff springs** have the extension of their rule at the end of a step (`springs.rs`).
 //!
 //! **Limits in `backtracking`.** The force of a limit is that of the start of the sub-step and
 //! holds over it. The force that is required changes with the motion of the other links, so at the
@@ -43,7 +46,7 @@ mod overlap;
 use super::budget::shared;
 use super::contacts::{Limit, lay_rows, limits, push, row_velocities, shift, unwhiten_onto, whiten, zero};
 use super::islands::each_island;
-use super::{Moment, Workspace, unreachable_joints};
+use super::{Moment, Workspace, springs, unreachable_joints};
 use crate::constraint::builder::constraints;
 use crate::constraint::rows::{RowSet, Rows};
 use crate::derived::Cache;
@@ -110,7 +113,8 @@ pub(super) fn correct(
     options: &Options,
 ) -> Result<(), StepError> {
     let time = core.state.time + options.h;
-    let joints = !matches!(options.contacts, Contacts::InPlace) && work.targets.iter().any(is_joint);
+    let joints = !matches!(options.contacts, Contacts::InPlace)
+        && (work.targets.iter().any(is_joint) || springs::any_stiff(work));
     let mut gaps = measure_gaps(core, work, options, time)?;
     if overlap::separate(core, acting.as_deref_mut(), work, &gaps, options) && !gaps.is_empty() {
         gaps = measure_gaps(core, work, options, time)?;
@@ -158,7 +162,7 @@ fn measure_gaps(core: &mut Core, work: &Workspace, options: &Options, time: f64)
     Ok(gaps)
 }
 
-/// Corrects joints and limits at the moment `end`. `acting` is absent if there are no joints.
+/// Corrects joints, springs and limits at the moment `end`. `acting` is absent if there are only limits.
 fn correct_at(
     core: &mut Core,
     end: &mut Moment,
@@ -169,10 +173,12 @@ fn correct_at(
 ) -> Result<(), StepError> {
     let kept = unreachable_joints::left(work, |i| work.targets[i].error, options.recovery);
     let pushed = if acting.is_some() { pushed(work) } else { vec![false; core.dof] };
+    let extensions = if acting.is_some() { springs::extensions_at_end(work, options.level) } else { Vec::new() };
     let goal = Goal {
         time: core.state.time + options.h,
         level: options.level,
         kept: &kept,
+        extensions: &extensions,
         joints: core.settings.stabilize_positions,
         limits: options.limits,
         velocities: Some(&pushed),
@@ -226,7 +232,7 @@ fn newton(
         if groups.iter().all(|group| group.done) {
             return Ok(());
         }
-        let (before, moved_before) = (at.x.clone(), moved.to_vec());
+        let (before, moved_before, yielded) = (at.x.clone(), moved.to_vec(), errors.yielded.clone());
         round_at_state(core, at, groups, errors, moved);
         if let Some((work, acting)) = &mut step {
             round_of_step(core, at, (work, acting), groups, errors, moved);
@@ -240,6 +246,7 @@ fn newton(
         for group in groups.iter_mut().filter(|group| !group.done) {
             if group.judge(errors.of(group)) {
                 group.restore((&before, &mut at.x), (&moved_before, moved));
+                group.rows.iter().for_each(|&i| errors.yielded[i as usize] = yielded[i as usize]);
                 undone = true;
             }
         }
@@ -256,7 +263,9 @@ fn round_at_state(core: &Core, at: &mut Moment, groups: &[Group], errors: &mut E
         group.damp(errors.probe, group.largest(&errors.position));
     }
     let parts: Vec<Round> = taken.iter().map(|group| group.round(&group.rows)).collect();
-    apply(core, at.coordinates(core), &errors.probe.rows, 0, errors, &parts, moved);
+    let rows = std::mem::take(&mut errors.probe.rows);
+    apply(core, at.coordinates(core), (&rows, 0), errors, &parts, moved);
+    errors.probe.rows = rows;
 }
 
 /// Takes a round with the rows of the step.
@@ -265,13 +274,13 @@ fn round_of_step(
     at: &mut Moment,
     (work, acting): (&Workspace, &mut Moment),
     groups: &[Group],
-    errors: &Errors,
+    errors: &mut Errors,
     moved: &mut [f64],
 ) {
     let taken = groups.iter().filter(|group| !group.done && group.chord);
     let parts: Vec<Round> = taken.map(|group| group.round(&group.blocks)).collect();
     let at = at.coordinates_by(core, &mut acting.derived.caches);
-    apply(core, at, &work.rows, work.contact_constraints.len(), errors, &parts, moved);
+    apply(core, at, (&work.rows, work.contact_constraints.len()), errors, &parts, moved);
 }
 
 /// Solves for the blocks of all `parts` in `rows`, whose constraints begin at block `first`, and moves the
@@ -279,9 +288,8 @@ fn round_of_step(
 fn apply(
     core: &Core,
     Coordinates { objects, x, caches, threads }: Coordinates,
-    rows: &Rows,
-    first: usize,
-    errors: &Errors,
+    (rows, first): (&Rows, usize),
+    errors: &mut Errors,
     parts: &[Round],
     moved: &mut [f64],
 ) {
@@ -314,6 +322,9 @@ fn apply(
         };
         zero(&mut lambda, rows.len);
         each_island(&core.threads, rows, islands, (&mut lambda, du), solve, |()| ());
+        if positions {
+            errors.yield_to(&rows.blocks[first..], &lambda);
+        }
     }
     unwhiten_onto(Coordinates { objects, x: &mut *x, caches: &mut *caches, threads }, &dx, moved);
     shift(Coordinates { objects, x: &mut *x, caches: &mut *caches, threads }, &dx, 1.0);
@@ -340,7 +351,7 @@ fn pushed(work: &mut Workspace) -> Vec<bool> {
     pushed
 }
 
-/// Returns the errors of all constraint rows at the present, and the rows at the middle of the
+/// Returns the targets of all constraint rows at the present, and the rows at the middle of the
 /// step: free motion of `ahead` seconds, corrected onto the joints. Their Jacobians are those of
 /// the middle, their responses those of the moment `acting` (or else of the present), like all rows
 /// of a step.
@@ -349,17 +360,17 @@ pub(super) fn middle(
     acting: Option<&mut Moment>,
     level: Level,
     ahead: f64,
-) -> Result<(Vec<f64>, Workspace), StepError> {
+) -> Result<(Vec<RowTarget>, Workspace), StepError> {
     let (mut layout, mut rows) = (Workspace::default(), Workspace::default());
     let (start, time) = (core.state.time, core.state.time + ahead);
     lay_rows(core.basis(None, start, None), &mut layout, level)?;
-    let present: Vec<f64> = layout.targets.iter().map(|t| t.error).collect();
+    let present = layout.targets.clone();
     let closing = present_velocities(core, &layout);
     let mut at = core.moment();
     advance(core, &mut at, ahead);
     // open joints aim half-way closer: this shows whether they are unreachable
     let closer = if core.settings.stabilize_positions { core.settings.recovery_speed * ahead } else { 0.0 };
-    let kept = |closer: f64| unreachable_joints::left(&layout, |i| present[i], closer);
+    let kept = |closer: f64| unreachable_joints::left(&layout, |i| present[i].error, closer);
     let aims = [kept(closer), kept(2.0 * closer)];
     let groups = onto_joints(core, &mut at, (&mut layout, &mut rows), (level, time), &aims[0])?;
     let mut far = unreachable(core, &groups);
@@ -404,7 +415,7 @@ fn onto_joints(
     (level, time): (Level, f64),
     kept: &[f64],
 ) -> Result<Vec<Group>, StepError> {
-    let goal = Goal { time, level, kept, joints: true, limits: Limits::Free, velocities: None };
+    let goal = Goal { time, level, kept, extensions: &[], joints: true, limits: Limits::Free, velocities: None };
     let mut errors = Errors::new(core, layout, rows, goal);
     errors.measure(core, at)?;
     let mut groups = Group::all(core, layout, &errors, false);

@@ -17,6 +17,7 @@ mod patch;
 mod resistance;
 mod slide_end;
 mod solves;
+mod springs;
 mod time_stepping;
 mod turning;
 mod unreachable_joints;

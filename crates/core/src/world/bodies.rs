@@ -71,6 +71,8 @@ impl World {
     pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
         let mends = enabled && self.status(id).is_some_and(|status| !status.enabled);
         self.status_mut(id)?.enabled = enabled;
+        self.core.find_joined();
+        self.core.wake_near(id);
         if mends {
             self.find_turns(id); // it did not follow while it was broken
         }
@@ -83,6 +85,7 @@ impl World {
     /// [`WorldError::Stale`] if the object was removed.
     pub fn set_collidable(&mut self, id: ObjectId, collidable: bool) -> Result<(), WorldError> {
         self.status_mut(id)?.collidable = collidable;
+        self.core.wake_near(id);
         Ok(())
     }
 
@@ -178,6 +181,7 @@ impl World {
         }
         self.core.state.x[entry.state_range.x.clone()].copy_from_slice(x);
         self.core.integration().refresh_one(id);
+        self.core.wake_near(id);
         Ok(())
     }
 
@@ -468,6 +472,7 @@ impl World {
         }
         core.state.x[entry.state_range.x.clone()].copy_from_slice(&x);
         core.integration().refresh_one(id);
+        core.wake_near(id);
         Ok(())
     }
 }

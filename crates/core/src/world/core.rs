@@ -259,6 +259,7 @@ impl Core {
         self.state.clone_from(state);
         self.clear_contact_forces();
         self.state.write_accelerations(0..state.accelerations.len(), &mut self.derived.part_states);
+        self.find_joined();
         self.refresh();
     }
 

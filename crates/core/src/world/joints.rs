@@ -73,6 +73,14 @@ impl Core {
         })
     }
 
+    /// Lists the parts that joints hold together.
+    pub(crate) fn find_joined(&mut self) {
+        self.pair_materials.part_all();
+        let enabled = self.table.with(&self.state.objects).all().filter(|entry| entry.status.enabled);
+        let joined = enabled.filter_map(|entry| entry.object.constraint()?.joined_parts());
+        joined.for_each(|parts| self.pair_materials.join(parts));
+    }
+
     /// Lists the joints that break under the forces of the rows of constraints, in N and N·m.
     pub(crate) fn break_joints(&mut self, rows: &[RowStart]) {
         let view = WorldView { implicit: self.implicit, ..self.view(self.state.time) };
@@ -99,6 +107,9 @@ impl Core {
             if let Some(place) = self.by_serial(*serial) {
                 self.state.objects[place].status.enabled = false;
             }
+        }
+        if !self.broken.is_empty() {
+            self.find_joined();
         }
     }
 }

@@ -470,6 +470,14 @@ impl World {
         core.integration().refresh_one(id);
         self.names.insert(name, id);
         self.start_turns(id);
+        match self.core.table.placed[place as usize].object.constraint() {
+            Some(constraint) => {
+                let joined = constraint.joined_parts();
+                joined.into_iter().for_each(|parts| self.core.pair_materials.join(parts));
+                self.core.wake(id);
+            }
+            None => self.core.wake_near(id),
+        }
         Ok(id)
     }
 
@@ -519,6 +527,7 @@ impl World {
         }
         core.owners[gone.state_range.parts.start..].iter_mut().for_each(|owner| owner.place -= 1);
         core.pair_materials.forget(id);
+        core.find_joined();
         core.contacts.retain(|c| c.a != id && c.b != id);
         core.events.retain(|event| !event.names(id));
         Ok(gone.object)

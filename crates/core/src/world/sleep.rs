@@ -30,7 +30,7 @@ use crate::world::Core;
 use crate::world::view::{Entry, Mode, ObjectId};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
-use tumble_collide::Pose;
+use tumble_collide::{Pose, Vec3};
 
 /// Conditions under which islands fall asleep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,6 +152,37 @@ impl Core {
                 .iter()
                 .any(|serial| g.members.binary_search(serial).is_ok() || g.supports.iter().any(|s| s.serial == *serial))
         });
+    }
+
+    /// Wakes the objects that sleep where an object that does not move by itself has come: it touches nobody while others
+    /// are not walked.
+    pub(crate) fn wake_near(&mut self, id: ObjectId) {
+        if self.state.groups.is_empty() {
+            return;
+        }
+        let Some(place) = self.table.place(id) else { return };
+        let balls = |place: usize| -> Vec<(Vec3, f64)> {
+            let entry = self.objects().at(place);
+            let Some(body) = entry.object.collidable().filter(|_| entry.status.enabled && entry.status.collidable)
+            else {
+                return Vec::new();
+            };
+            let states = self.derived.part_states[entry.state_range.parts.clone()].iter().enumerate();
+            states.filter_map(|(part, s)| Some((s.position(), body.shape(part)?.bounding_radius()))).collect()
+        };
+        let own = balls(place);
+        let meets = |serial: &u32| {
+            let other = self.by_serial(*serial).map(balls).unwrap_or_default();
+            other.iter().any(|(p, r)| own.iter().any(|(q, s)| (p - q).norm() <= r + s))
+        };
+        let met: Vec<u32> = if own.is_empty() {
+            Vec::new()
+        } else {
+            self.state.groups.iter().filter(|g| g.members.iter().any(meets)).map(|g| g.members[0]).collect()
+        };
+        if !met.is_empty() {
+            self.wake_groups(|g| met.contains(&g.members[0]));
+        }
     }
 
     /// Wakes all objects.

@@ -406,3 +406,40 @@ fn a_checkpoint_holds_sleep_and_is_refused_after_an_object_was_added() {
         assert!(!world.roll_back(&checkpoint) && world.save() == now, "{stepper}");
     }
 }
+
+#[test]
+fn a_joint_that_is_added_to_sleepers_wakes_them() {
+    for stepper in STEPPERS {
+        let (mut world, ids) = sleeping_stack(stepper);
+        let top = Vec3::new(0.0, 0.0, 1.25);
+        let place = JointPlace::between(top, top + Vec3::new(0.0, 0.0, 2.0));
+        let mut spring =
+            LoopJoint::joining("s", LoopJointKind::Spring, &world, Some((ids[2], 0)), None, place).unwrap();
+        let dof = spring.dof().clone();
+        let pulls = articulated::Spring { stiffness: 400.0, rest: 0.5 };
+        spring.set_dof(articulated::DofSettings { spring: Some(pulls), ..dof }).unwrap();
+        world.add(spring).unwrap();
+        run(&mut world, 30);
+        let height = world.part_state(ids[2], 0).unwrap().position().z;
+        assert!(height > 1.3, "{stepper}: at {height} m, asleep: {}", world.asleep(ids[2]));
+    }
+}
+
+#[test]
+fn a_static_body_that_comes_into_a_sleeper_wakes_it() {
+    for stepper in STEPPERS {
+        let wedge = || RigidBody::new(cube(0.5)).with_name("wedge");
+        let inside = Pose::translation(0.4, 0.0, 1.25);
+        let (mut world, ids) = sleeping_stack(stepper);
+        world.add_static(wedge().with_pose(inside)).unwrap();
+        assert!(!world.asleep(ids[2]), "{stepper}: added");
+        let (mut world, ids) = sleeping_stack(stepper);
+        let far = world.add_static(wedge().with_pose(Pose::translation(40.0, 0.0, 1.25))).unwrap();
+        assert!(world.asleep(ids[2]), "{stepper}: added far away");
+        world.set_pose(far, inside).unwrap();
+        assert!(!world.asleep(ids[2]), "{stepper}: moved");
+        run(&mut world, 60);
+        let x = world.part_state(ids[2], 0).unwrap().position().x;
+        assert!(x < -0.05, "{stepper}: pushed to {x} m");
+    }
+}

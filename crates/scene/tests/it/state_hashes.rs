@@ -67,7 +67,7 @@ table! {
     robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "ab1a03e9bd8ec5bb";
     robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c622c65d53ec29f0";
     skeleton_time_stepping: "skeleton", TimeStepping, "e4e23c0c3f5d9795", "aba735043a95bb06";
-    skeleton_backtracking: "skeleton", Backtracking, "13874effa4b90c9b", "7ce4a84ccde79dd4";
+    skeleton_backtracking: "skeleton", Backtracking, "3972aeec7ed4684a", "0503afb338b9a6b0";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
 }

@@ -107,6 +107,11 @@ impl LoopJointKind {
         self.turns_at(0)
     }
 
+    /// Returns whether the parts that it joins stay together: with less than the distance of two points between them.
+    pub fn holds_together(self) -> bool {
+        !self.has_length()
+    }
+
     /// Returns whether its position is a length: the distance of its origins, or that of a pulley.
     pub fn has_length(self) -> bool {
         use LoopJointKind::*;

@@ -43,7 +43,8 @@
 //! position                                     rate       w
 //! angle about z_B      ∠(x_B, x_A)             w·ω        z_B
 //! Cardan's angles      about z_A; about x_B    w·ω        reciprocal basis of (z_A, x_B)
-//! rotation vector r    log(R_Bᵀ·R_A), per axis w·ω        x_B, y_B, z_B           drives and springs pull along log(R_Bᵀ·R_A·R_*ᵀ)
+//! rotation vector r    log(R_Bᵀ·R_A), per axis w·ω        x_B, y_B, z_B           drives pull along log(R_Bᵀ·R_A·R_*ᵀ)
+//! springs of it        log(R_Bᵀ·R_A·R_*ᵀ)      w·ω        R_B·J⁻ᵀ(r)·e            J⁻¹(r) = 1 − ½[r] + c·[r]²
 //! displacement         t·d,  t = x_B, y_B, z_B t·s(p_A)
 //! length               |d|                     n·ḋ
 //! swing (cone)         θ                       w·ω        n
@@ -91,7 +92,7 @@ use crate::constraint::builder::RowBuilder;
 use crate::constraint::dof_rows::DofState;
 use crate::constraint::rows::RowSet;
 use crate::object::part_state::{Forces, StateRange};
-use crate::object::{Constraint, ForceGenerator, FrameState, Level, Object, RowTarget};
+use crate::object::{Constraint, ForceGenerator, FrameState, Level, Object, RowTarget, SpringRow};
 use crate::world::view::{ObjectId, WorldView};
 use pair::{Coordinate, EndPair, JointRow, Motion, Term};
 use smallvec::SmallVec;
@@ -264,36 +265,36 @@ impl LoopJoint {
         all
     }
 
-    /// Returns the positions that pull towards goals, of each degree of freedom: `goal + e` with the way `e` from there.
-    fn positions_from(
-        &self,
-        pair: &EndPair,
-        coordinates: &[Coordinate],
-        goal: impl Fn(&DofSettings) -> Option<f64>,
-    ) -> SmallVec<[f64; 3]> {
-        let goals: SmallVec<[Option<f64>; 3]> = self.dofs.iter().map(|dof| goal(&dof.settings)).collect();
-        if self.kind == LoopJointKind::Spherical {
-            let from = Vec3::from_fn(|k, _| goals[k].unwrap_or(0.0));
-            return (from + pair.turn_from(&from)).iter().copied().collect();
+    /// Returns the positions that springs see, with the rows along which they pull.
+    fn sprung(&self, pair: &EndPair, coordinates: &[Coordinate]) -> SmallVec<[Coordinate; 3]> {
+        if self.kind != LoopJointKind::Spherical {
+            return coordinates.into();
         }
-        coordinates.iter().map(|coordinate| coordinate.position).collect()
+        let from = self.goals(|dof| dof.spring.map(|spring| spring.rest));
+        let turned = pair.turned_from(&from).into_iter().zip(from.iter());
+        turned.map(|(turned, from)| Coordinate { position: from + turned.position, ..turned }).collect()
     }
 
-    /// Returns the positions that springs see.
-    fn sprung(&self, pair: &EndPair, coordinates: &[Coordinate]) -> SmallVec<[f64; 3]> {
-        self.positions_from(pair, coordinates, |dof| dof.spring.map(|spring| spring.rest))
+    /// Returns the goals of a spherical joint, 0 where there is none.
+    fn goals(&self, goal: impl Fn(&DofSettings) -> Option<f64>) -> Vec3 {
+        Vec3::from_fn(|k, _| goal(&self.dofs[k].settings).unwrap_or(0.0))
     }
 
-    /// Returns the positions that drives see: an angle without limits goes the shorter way.
+    /// Returns the positions that drives see, `goal + e` with the way `e` from there: an angle without limits goes the
+    /// shorter way.
     fn driven(&self, pair: &EndPair, coordinates: &[Coordinate]) -> SmallVec<[f64; 3]> {
         let target = |dof: &DofSettings| match &dof.drive {
             Drive::Position { target, .. } => Some(*target),
             _ => None,
         };
-        let mut positions = self.positions_from(pair, coordinates, target);
+        if self.kind == LoopJointKind::Spherical {
+            let from = self.goals(target);
+            return (from + pair.turn_from(&from)).iter().copied().collect();
+        }
+        let mut positions: SmallVec<[f64; 3]> = coordinates.iter().map(|coordinate| coordinate.position).collect();
         for (k, position) in positions.iter_mut().enumerate() {
             let settings = &self.dofs[k].settings;
-            let turns = self.kind.turns_at(k) && self.kind != LoopJointKind::Spherical && settings.limits.is_none();
+            let turns = self.kind.turns_at(k) && settings.limits.is_none();
             if let (true, Some(target)) = (turns, target(settings)) {
                 *position = near(*position, target);
             }
@@ -354,9 +355,13 @@ impl LoopJoint {
             let state = DofState { q: driven[k], v: coordinate.rate, settings, limits };
             state.velocity_limits().for_each(|(sign, target)| row(coordinate.row(sign, target)));
             state.resistance(level, |target| row(coordinate.row(1.0, target)));
-            if let Some(target) = state.spring(level, sprung[k]) {
-                row(coordinate.row(1.0, target));
+            let state = DofState { v: sprung[k].rate, ..state };
+            if let (Some(target), Some(spring)) = (state.spring(level, sprung[k].position), settings.spring) {
+                let (extension, damping) = (sprung[k].position - spring.rest, settings.damping);
+                let spring = Some(SpringRow { extension, stiffness: spring.stiffness, damping });
+                row(sprung[k].row(1.0, RowTarget { spring, ..target }));
             }
+            let state = DofState { v: coordinate.rate, ..state };
             if let Some(target) = state.drive(level, time) {
                 row(JointRow { drives: Some(k), ..coordinate.row(1.0, target) });
             }
@@ -374,7 +379,8 @@ impl LoopJoint {
         for (k, (coordinate, FreeDof { settings, .. })) in coordinates.iter().zip(&self.dofs).enumerate() {
             let resisted = settings.explicit_force(driven[k], coordinate.rate);
             let drive = resisted + settings.damping * coordinate.rate;
-            act(coordinate, k, [settings.spring_force(sprung[k]) + resisted, drive]);
+            act(&sprung[k], k, [settings.spring_force(sprung[k].position), 0.0]);
+            act(coordinate, k, [resisted, drive]);
         }
     }
 
@@ -443,6 +449,10 @@ impl Constraint for LoopJoint {
         true
     }
 
+    fn joined_parts(&self) -> Option<[(ObjectId, usize); 2]> {
+        Some([self.a.part?, self.b.part?]).filter(|_| self.kind.holds_together())
+    }
+
     fn rows(&self, _me: &StateRange, view: &WorldView, level: Level, out: &mut RowBuilder) {
         let Some(pair) = self.pair(view) else { return };
         self.lay(&pair, level, view.time, &mut |row| pair.add(&row, out));
@@ -482,7 +492,7 @@ impl ForceGenerator for LoopJoint {
         };
         let springs = self.dofs.iter().map(|dof| dof.settings.spring);
         let stretched = springs.zip(self.sprung(&pair, &self.coordinates(&pair)));
-        stretched.map(|(spring, q)| spring.map_or(0.0, |s| 0.5 * s.stiffness * (q - s.rest).powi(2))).sum()
+        stretched.map(|(spring, q)| spring.map_or(0.0, |s| 0.5 * s.stiffness * (q.position - s.rest).powi(2))).sum()
     }
 
     fn kinetic(&self, view: &WorldView) -> f64 {

@@ -11,6 +11,15 @@ use crate::world::{Coordinates, Core, StepError};
 /// Maximum number of corrections of a time found by dense output, before the dense state is taken.
 const CORRECTIONS: u32 = 2;
 
+/// Returns the integrator of the sub-step. Soft rows are made for the path of constant forces, which both first-order
+/// integrators leave: with a stiff spring they would explode.
+fn integrator_of(core: &Core) -> Integrator {
+    match core.settings.integrator {
+        Integrator::SymplecticEuler | Integrator::ExplicitEuler if core.implicit => Integrator::Verlet,
+        integrator => integrator,
+    }
+}
+
 /// Returns the generalized velocities `h` seconds of free motion after a state. Those of objects whose state holds
 /// velocities are those of the state.
 fn velocities_after(core: &mut Core, x: &[f64], h: f64) -> Vec<f64> {
@@ -105,7 +114,7 @@ impl Backtracking {
         }
         core.state.x.copy_from_slice(start);
         core.integration().refresh();
-        let (time, integrator) = (core.state.time, core.settings.integrator);
+        let (time, integrator) = (core.state.time, integrator_of(core));
         self.adaptive.set(&core.settings, core.state.inner_step, core.report.inner_steps);
         let came = core.integration().integrate(integrator, time, h, &mut self.work.dp, &mut self.adaptive)?;
         if integrator == Integrator::DormandPrince {

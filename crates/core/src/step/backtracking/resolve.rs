@@ -4,7 +4,7 @@ use super::{Backtracking, FLOOR, is_soft};
 use crate::constraint::rows::{Block, RowSet};
 use crate::contact::detect::ContactConstraint;
 use crate::contact::motion;
-use crate::object::Level;
+use crate::object::{Level, RowTarget};
 use crate::sensor::loads::SubstepForces;
 use crate::solver::SolverSettings;
 use crate::step::adhesion::adhere;
@@ -78,11 +78,12 @@ impl Backtracking {
         whiten(core.coordinates(None), &work.dp, 0.0, &mut u, &mut work.du_force);
         let before = u.clone();
         let budget = core.meter.left(IMPACTS);
-        // rows of limits are those of the middle of the sub-step: what turns towards them until then is no impact
+        // rows of joints and limits are those of the middle of the sub-step: what turns until then is no impact
         let bias = work.bias.clone();
         if let Level::Acceleration { h, .. } = self.level {
-            let limits = work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets);
-            for (block, target) in limits.filter(|(_, target)| target.set == RowSet::HalfLine) {
+            let rows = work.rows.blocks[work.contact_constraints.len()..].iter().zip(&work.targets);
+            let turns = |target: &RowTarget| target.set == RowSet::HalfLine || correction::is_joint(target);
+            for (block, target) in rows.filter(|(_, target)| turns(target)) {
                 work.bias[block.row as usize] -= 0.5 * h * target.bias_acceleration;
             }
         }

@@ -2,10 +2,10 @@
 //! correction starts from.
 
 use super::super::contacts::{lay_rows, row_velocities, whiten};
-use super::super::{Moment, Workspace};
+use super::super::{Moment, Workspace, springs};
 use super::group::Group;
 use super::is_joint;
-use crate::constraint::rows::RowSet;
+use crate::constraint::rows::{Block, RowSet};
 use crate::object::Level;
 use crate::world::{Core, StepError};
 
@@ -15,6 +15,13 @@ const MIN_VELOCITY_TOLERANCE: f64 = 1e-12;
 /// Returns the error of a corrected row, m or rad, for a contact tolerance.
 pub(super) fn position_tolerance(contact_tolerance: f64) -> f64 {
     1e-2 * contact_tolerance
+}
+
+/// Returns which targets resist corrections: inertias, and springs, dampers and drives of finite gain that are stiff for the
+/// step.
+fn resisting(work: &Workspace) -> Vec<bool> {
+    let blocks = &work.rows.blocks[work.contact_constraints.len()..];
+    work.targets.iter().zip(blocks).map(|(t, block)| t.inertial || springs::is_stiff(work, block, t)).collect()
 }
 
 /// A limit with a force.
@@ -65,6 +72,8 @@ pub(super) struct Goal<'a> {
     pub level: Level,
     /// Error of each constraint row that remains, m or rad.
     pub kept: &'a [f64],
+    /// Extensions of springs by the midpoint rule; empty if springs have no error.
+    pub extensions: &'a [f64],
     /// Whether the positions of joints are corrected.
     pub joints: bool,
     pub limits: Limits<'a>,
@@ -82,11 +91,13 @@ pub(super) struct Errors<'a> {
     pub tolerance: (f64, f64),
     /// The rows at the state.
     pub probe: &'a mut Workspace,
-    /// Per target: whether it is a limit with a reported gap, a joint, an inertia, an active limit; and whether
-    /// an active limit keeps its velocity.
+    /// Per target: whether it is a limit with a reported gap, a joint, an inertia or a stiff spring, an active limit; and
+    /// whether an active limit keeps its velocity.
     is_limit: Vec<bool>,
     is_joint: Vec<bool>,
-    is_inertial: Vec<bool>,
+    resists: Vec<bool>,
+    /// Displacement by which each stiff spring has yielded to the correction, m or rad.
+    pub yielded: Vec<f64>,
     active: Vec<bool>,
     keeps_velocity: Vec<bool>,
 }
@@ -106,7 +117,8 @@ impl<'a> Errors<'a> {
             probe,
             is_limit: vec![false; n],
             is_joint: work.targets.iter().map(is_joint).collect(),
-            is_inertial: work.targets.iter().map(|t| t.inertial).collect(),
+            resists: resisting(work),
+            yielded: vec![0.0; n],
             active: vec![false; n],
             keeps_velocity: vec![false; n],
         };
@@ -130,15 +142,15 @@ impl<'a> Errors<'a> {
         errors
     }
 
-    /// Returns whether a target is a joint, an active limit, or an inertia, which is part of the mass that corrections
-    /// move.
+    /// Returns whether a target is a joint, an active limit, or resists: an inertia or a stiff spring is part of the mass
+    /// that corrections move.
     pub fn measures(&self, target: usize) -> bool {
-        self.is_joint[target] || self.active[target] || self.is_inertial[target]
+        self.is_joint[target] || self.active[target] || self.resists[target]
     }
 
-    /// Returns whether a target is an inertia.
-    pub fn is_inertial(&self, target: usize) -> bool {
-        self.is_inertial[target]
+    /// Returns whether a target is an inertia or a stiff spring.
+    pub fn resists(&self, target: usize) -> bool {
+        self.resists[target]
     }
 
     /// Returns whether a target is an active limit.
@@ -202,6 +214,10 @@ impl<'a> Errors<'a> {
                 self.position[i] = target.error - self.goal.kept[i].min(0.0);
             } else if joint && self.goal.joints {
                 self.position[i] = target.error - self.goal.kept[i];
+            } else if let (Some(spring), Some(by_rule), true) =
+                (target.spring, self.goal.extensions.get(i), self.resists[i])
+            {
+                self.position[i] = spring.extension - by_rule + self.yielded[i];
             }
             if let Some(pushed) = self.goal.velocities
                 && (joint || limit)
@@ -210,6 +226,13 @@ impl<'a> Errors<'a> {
             {
                 self.velocity[i] = c[i] - target.velocity;
             }
+        }
+    }
+
+    /// Adds the multipliers of a round to what springs have yielded. `blocks` are those of the constraints.
+    pub fn yield_to(&mut self, blocks: &[Block], lambda: &[f64]) {
+        for (i, block) in blocks.iter().enumerate().filter(|(i, _)| self.resists[*i]) {
+            self.yielded[i] += block.compliance * lambda[block.row as usize];
         }
     }
 

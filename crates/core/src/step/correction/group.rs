@@ -99,7 +99,7 @@ impl Group {
     /// Returns the groups of the rows that `errors` measures. At the end of a step they start with
     /// the rows of the step, unless they contain a limit.
     pub fn all(core: &Core, work: &mut Workspace, errors: &Errors, at_end: bool) -> Vec<Group> {
-        let (contacts, Workspace { rows, islands, first, .. }) = (work.contact_constraints.len(), work);
+        let (contacts, Workspace { rows, islands, first, targets, .. }) = (work.contact_constraints.len(), work);
         islands.build(rows, |b| b >= contacts && errors.measures(b - contacts));
         let entries = by_start(core.objects());
         let group = |blocks: &[u32]| {
@@ -119,14 +119,16 @@ impl Group {
             };
             let large = blocks.len() > MAX_DIRECT_ROWS;
             let rows: Vec<u32> = blocks.iter().map(|b| b - contacts as u32).collect();
-            let (inertias, held): (Vec<u32>, Vec<u32>) = rows.iter().partition(|&&i| errors.is_inertial(i as usize));
+            let (resisting, held): (Vec<u32>, Vec<u32>) = rows.iter().partition(|&&i| errors.resists(i as usize));
             let joints: Vec<u32> = held.iter().copied().filter(|&i| !errors.is_active(i as usize)).collect();
             Group {
                 blocks: blocks.to_vec(),
                 ranges: ranges.map(|e| (e.state_range.x.clone(), e.state_range.v.clone())).collect(),
                 left: (f64::INFINITY, f64::INFINITY),
-                chord: at_end && joints.len() + inertias.len() == rows.len(),
-                single_round: joints.is_empty() && errors.holds_limits(),
+                chord: at_end && joints.len() + resisting.len() == rows.len(),
+                single_round: joints.is_empty()
+                    && errors.holds_limits()
+                    && resisting.iter().all(|&i| targets[i as usize].spring.is_none()),
                 done: false,
                 rounds: match (large, at_end) {
                     (true, _) => MAX_ROUNDS_OF_LARGE,

@@ -16,7 +16,7 @@
 //!
 //! ```text
 //! δ  = (h/12)·(Σ λ·(w₁ − w₀) / ½(|v₀|² + |v₁|²))·½(v₀ + v₁)                   then  g(x₁) = 0,  J₁v₁ = 0
-//! W  = Σ λ·½(w₀ + w₁)  +  T(x₁, p₁) − T(x*, p*)  −  F·(δ + correction)          sums over the rows of joints
+//! W  = Σ λ·½(w₀ + w₁)  +  T(x₁, p₁) − T(x*, p*)  −  F·(δ + correction)  +  V(x₁) − V(x₀)          sum over the rows
 //! v₁ ← s·v₁,      ½(1 − s²)·|v₁|² = W
 //! ```
 //!
@@ -25,6 +25,7 @@
 //! | `λ`, `w₀`, `w₁` | multipliers of the step, velocities of rows before and after |
 //! | `x*`, `p*`; `x₁`, `p₁` | state before, after the correction |
 //! | `T`, `F` | kinetic energy, forces. Bodies that resist turning have an inertia `ΔI` more in this step (`step/resistance.rs`): `½(ω₀ + ω₁)·ΔI·(ω₁ − ω₀)` is taken from `W` |
+//! | `V` | energy of the springs in the group, which are stiff for the step: what they released was `Σ λ·½(w₀ + w₁)` |
 //! | `v`, `|v|²` | velocity, twice its energy. In a group that nothing joins to the ground both are those relative to the rigid motion that has its momenta, which stay as they are |
 //!
 //! One factor for all velocities keeps joints closed in velocity. In a mechanism of one degree of freedom it is the only
@@ -38,7 +39,8 @@
 use super::super::{Moment, Workspace};
 use super::group::{Group, by_start, entry_at};
 use super::is_joint;
-use crate::constraint::rows::Block;
+use crate::constraint::rows::{Block, RowSet};
+use crate::object::{RowTarget, SpringRow};
 use crate::rigid::RigidBody;
 use crate::step::contacts::{push, shift, unwhiten_onto};
 use crate::world::Core;
@@ -76,6 +78,8 @@ pub(super) struct Workless {
     rows: Vec<u32>,
     places: Vec<usize>,
     to_ground: bool,
+    /// Whether it has dampers: they take energy, and so do springs beside them.
+    takes_only: bool,
     /// Work of the rows less the kinetic energy before the correction, J.
     done: f64,
 }
@@ -100,6 +104,9 @@ pub(super) fn advance(
         let rows = || group.rows.iter().map(|&i| (i as usize, &work.rows.blocks[contacts + i as usize]));
         let is_workless = |(i, block): (usize, &Block)| {
             let (target, row) = (&work.targets[i], block.row as usize);
+            if is_soft(target) {
+                return true;
+            }
             is_joint(target)
                 && block.compliance == 0.0
                 && target.velocity == 0.0
@@ -139,11 +146,17 @@ pub(super) fn advance(
             }
         }
         let (mut done, mut turned) = (0.0, 0.0);
-        for (_, block) in rows() {
+        for (i, block) in rows() {
             let [first, last] = [&before, &after].map(|u| work.rows.row_velocity(block, 0, u));
-            let impulse = impulses.scale * work.lambda[block.row as usize];
-            done += 0.5 * impulse * (first + last);
-            turned += impulse * (last - first);
+            let (target, impulse) = (&work.targets[i], impulses.scale * work.lambda[block.row as usize]);
+            match target.spring {
+                Some(spring) => done += 0.5 * impulse * (first + last) - energy_of(&spring),
+                None if is_joint(target) => {
+                    done += 0.5 * impulse * (first + last);
+                    turned += impulse * (last - first);
+                }
+                None => {} // a damper or a drive
+            }
         }
         let to_ground = rows().any(|(_, block)| block.sides().len() < 2);
         if !to_ground && ![&mut before, &mut after].into_iter().all(|u| make_relative(objects(), acting, u)) {
@@ -156,7 +169,12 @@ pub(super) fn advance(
             ranges().flatten().for_each(|i| ways[i] = 0.5 * share * (before[i] + after[i]));
         }
         let places = objects().map(|entry| entry.place).collect();
-        found.push(Workless { rows: group.rows.clone(), places, to_ground, done: done - kinetic });
+        let damped = |(i, _): (usize, &Block)| {
+            let target = &work.targets[i];
+            is_soft(target) && target.spring.is_none_or(|spring| spring.damping > 0.0)
+        };
+        let takes_only = rows().any(damped);
+        found.push(Workless { rows: group.rows.clone(), places, to_ground, takes_only, done: done - kinetic });
     }
     if ways.iter().any(|way| *way != 0.0) {
         unwhiten_onto(acting.coordinates(core), &ways, moved);
@@ -175,6 +193,7 @@ pub(super) fn give_back(
     (work, corrected, h): (&Workspace, &Workspace, f64),
 ) {
     let mut du = vec![0.0; core.dof];
+    let energy_at_end = |&i: &u32| corrected.targets[i as usize].spring.as_ref().map_or(0.0, energy_of);
     let (mut whitened, mut relative) = (du.clone(), du.clone());
     for found in workless {
         if !groups.iter().any(|group| group.rows == found.rows && group.closed()) {
@@ -184,9 +203,13 @@ pub(super) fn give_back(
         // joints are closed to a tolerance: what their forces do along the rest is no error
         let slack = |&i: &u32| {
             let (i, row) = (i as usize, work.rows.blocks[work.contact_constraints.len() + i as usize].row);
+            if !is_joint(&work.targets[i]) {
+                return 0.0;
+            }
             work.lambda[row as usize] * (corrected.targets[i].error - work.targets[i].error)
         };
         let mut done = found.done - impulses.scale / h * found.rows.iter().map(slack).sum::<f64>();
+        done += found.rows.iter().map(energy_at_end).sum::<f64>();
         let mut kinetic = 0.0;
         for entry in objects() {
             let Some(body) = entry.object.integratable() else { continue };
@@ -202,7 +225,7 @@ pub(super) fn give_back(
         }
         let ranges = || objects().flat_map(|entry| entry.state_range.v.clone());
         kinetic += ranges().map(|i| 0.5 * relative[i] * relative[i]).sum::<f64>();
-        if done != 0.0 && done.abs() <= MOST * kinetic {
+        if done != 0.0 && done.abs() <= MOST * kinetic && !(found.takes_only && done < 0.0) {
             let factor = (1.0 - done / kinetic).sqrt() - 1.0;
             ranges().for_each(|i| du[i] = factor * relative[i]);
         }
@@ -210,6 +233,16 @@ pub(super) fn give_back(
     if du.iter().any(|du| *du != 0.0) {
         push(end.coordinates(core), &du, &mut Vec::new());
     }
+}
+
+/// Returns whether a row is a spring, a damper or a drive of finite gain.
+fn is_soft(target: &RowTarget) -> bool {
+    target.set == RowSet::Equality && target.compliance > 0.0 && !target.inertial
+}
+
+/// Returns the energy of a spring, J.
+fn energy_of(spring: &SpringRow) -> f64 {
+    0.5 * spring.stiffness * spring.extension * spring.extension
 }
 
 /// Subtracts from the whitened velocities of bodies the rigid motion that has their momenta. Returns false if other
