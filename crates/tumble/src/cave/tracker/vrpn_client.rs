@@ -165,6 +165,7 @@ impl Session {
 mod tests {
     use super::*;
     use std::net::TcpListener;
+    use tumble::net::sync::Input;
 
     /// A message by the description of the protocol.
     fn message(sender: i32, kind: i32, contents: &[u8]) -> Vec<u8> {
@@ -193,7 +194,7 @@ mod tests {
     fn awaited(client: &VrpnClient, wanted: impl Fn(&Input) -> bool) -> Input {
         let start = Instant::now();
         loop {
-            if let Some(input) = client.inputs().into_iter().find(|input| wanted(input)) {
+            if let Some(input) = client.inputs().into_iter().map(|tracked| tracked.input).find(&wanted) {
                 return input;
             }
             assert!(start.elapsed() < Duration::from_secs(10), "no such input");
@@ -239,6 +240,16 @@ mod tests {
             assert_eq!((input.hands[1].unwrap().translation.x, input.buttons), (-x, 4));
         }
         assert_eq!(client.counts().dropped["invalid_rotation"], 2);
+        // each loss of the connection is reported, also for the same reason, and is an alarm
+        let (start, about) = (Instant::now(), client.presence());
+        while about.alarm().is_none() {
+            assert!(start.elapsed() < Duration::from_secs(10), "the loss is no alarm");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let closed = "the server closed the connection";
+        assert_eq!(about.alarm().unwrap(), format!("VRPN {at}: {closed}"));
+        let (lost, found) = (format!("VRPN {at}: {closed}; tries again"), format!("VRPN {at}: is connected"));
+        assert_eq!(about.lines(), [found.clone(), lost.clone(), found, lost]);
     }
 
     #[test]
