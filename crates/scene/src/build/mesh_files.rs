@@ -7,7 +7,6 @@ use tumble_core::collide::{RepairSettings, TriMesh, Vec3, decode_text};
 use crate::build::collada;
 use crate::open::plain::MAX_FILE_BYTES;
 
-
 /// Returns the bytes of a mesh file, at most 1 GiB. Pipes and devices, which could block the
 /// reader, are an error.
 ///

@@ -23,7 +23,10 @@ fn a_cave_goes_to_an_archive_and_back() {
     succeed(&["mpcdi", &archive, "--output", &again, "--overwrite"]);
     let said = succeed(&["mpcdi", "cube4", "--output", &archive, "--overwrite"]);
     assert!(said.contains("(4 projectors, profile a3)"), "{said}");
-    assert!(fail(&["mpcdi", "panorama", "--output", &archive, "--overwrite"], 2).contains("facet \"panorama\": shows directions"));
+    assert!(
+        fail(&["mpcdi", "panorama", "--output", &archive, "--overwrite"], 2)
+            .contains("facet \"panorama\": shows directions")
+    );
     std::fs::write(&archive, b"no zip").unwrap();
     let said = fail(&["mpcdi", &archive, "--output", &text(&folder.path("c"))], 2);
     assert!(said.contains("a.mpcdi: the archive: is no zip archive"), "{said}");

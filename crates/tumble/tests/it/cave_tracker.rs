@@ -2,7 +2,7 @@
 //! Control 1.0). Also replays of recorded user input.
 
 use crate::cave_place::in_place;
-use crate::cave_place::{Place, signal, wait, wall};
+use crate::cave_place::{Place, signal, states, wait, wall};
 use crate::cave_users::{SCENE, Server, one_screen, place};
 use crate::common::{json, text};
 use serde_json::{Value, json as value};
@@ -295,8 +295,7 @@ fn nodes_that_compute_and_replays_get_the_predicted_heads() {
     let heads = ["--tracker", &sender.to.to_string(), "--tracker-lead", "auto+10", "--tracker-smooth", "2"];
     let run = place.start("cave", &[&common[..], &live, &heads].concat());
     let start = Instant::now();
-    let states = |facet: &str| states(&place.log("out", facet));
-    while json(&place.folder.path("a.json")).is_null() {
+    while !place.folder.path("a.json").exists() {
         assert!(start.elapsed() < PATIENCE, "the run does not end");
         let x = (3.0 * start.elapsed().as_secs_f32()).sin() * 0.2;
         sender.send(&floats("/tumble/user/u/head", &[x, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0]));
@@ -305,7 +304,8 @@ fn nodes_that_compute_and_replays_get_the_predicted_heads() {
     assert_eq!(run.end().0, Some(0));
     let summary = json(&place.folder.path("a.json"));
     assert!(summary["tracker_lead"]["count"].as_u64() > Some(60), "{summary}");
-    assert!(states("l") == states("r") && states("l").len() > 100);
+    let (left, right) = (place.log("out", "l"), place.log("out", "r"));
+    assert!(states(&left) == states(&right) && left.len() > 100);
     for facet in summary["facets"].as_array().unwrap() {
         assert_eq!((&facet["mismatched"], &facet["first_difference"]), (&0.into(), &Value::Null));
     }

@@ -72,10 +72,8 @@ fn devices_behind_links_are_refused_and_not_read() {
         let mask = if key == "black_file" { "blend_file = \"b.png\"\n" } else { "" };
         let cave = crate::common::cave(&format!("size_px = [80, 60]\n{mask}{key} = {value}"));
         let cave = folder.write(&format!("{key}.toml"), cave);
-        for args in [
-            &["check", &cave][..],
-            &["cave", "pendulum", "--cave", &cave, "--offscreen", "--duration", "0.02"],
-        ] {
+        for args in [&["check", &cave][..], &["cave", "pendulum", "--cave", &cave, "--offscreen", "--duration", "0.02"]]
+        {
             let line = format!("ulimit -v 8000000; exec {} {}", env!("CARGO_BIN_EXE_tumble"), args.join(" "));
             let out = Command::new("sh").args(["-c", &line]).output().unwrap();
             let wrong = String::from_utf8_lossy(&out.stderr);

@@ -38,7 +38,8 @@ impl std::str::FromStr for Lead {
     fn from_str(text: &str) -> Result<Lead, String> {
         let seconds = |text: &str| {
             let ms = text.parse::<f64>().ok().filter(|ms| (0.0..=1e3 * MAX_LEAD_S).contains(ms));
-            ms.map(|ms| 1e-3 * ms).ok_or(format!("expected auto, auto+MS or MS, with MS from 0 to {}", 1e3 * MAX_LEAD_S))
+            ms.map(|ms| 1e-3 * ms)
+                .ok_or(format!("expected auto, auto+MS or MS, with MS from 0 to {}", 1e3 * MAX_LEAD_S))
         };
         match text.strip_prefix("auto") {
             None => seconds(text).map(Lead::Stated),

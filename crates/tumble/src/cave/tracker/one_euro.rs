@@ -236,8 +236,7 @@ mod tests {
             }
             (sum / f64::from(count)).sqrt().to_degrees()
         };
-        let (late, ahead, both) =
-            (error(None, 0.0), error(None, 0.04), error(Some(1.5), 0.04));
+        let (late, ahead, both) = (error(None, 0.0), error(None, 0.04), error(Some(1.5), 0.04));
         assert!((late - 2.65).abs() < 0.1, "{late}");
         assert!(ahead < late / 3.0 && both < late, "{late} {ahead} {both}");
     }

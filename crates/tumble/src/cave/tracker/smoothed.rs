@@ -87,14 +87,7 @@ impl SmoothedHeads {
 
 impl SmoothedUser {
     /// Returns the user's last input with the head predicted from `now`.
-    fn next(
-        &mut self,
-        lead: Lead,
-        display: &DisplayTimes,
-        start: Instant,
-        now: Instant,
-        fresh: bool,
-    ) -> AppliedInput {
+    fn next(&mut self, lead: Lead, display: &DisplayTimes, start: Instant, now: Instant, fresh: bool) -> AppliedInput {
         self.sequence += 1;
         let mut input = Input { sequence: self.sequence, ..self.last.input.clone() };
         let mut lead_s = None;
@@ -168,7 +161,14 @@ mod tests {
                 (sum, count) = (sum + error * error, count + 1);
             }
             let (skew, last) = (millis(6), millis(now + display + 3));
-            heads.display.shown(&FrameTimes { frame, facets: 2, skew, shown: last, error: Duration::ZERO, input: None });
+            heads.display.shown(&FrameTimes {
+                frame,
+                facets: 2,
+                skew,
+                shown: last,
+                error: Duration::ZERO,
+                input: None,
+            });
         }
         (sum / f64::from(count)).sqrt()
     }
@@ -176,8 +176,11 @@ mod tests {
     /// The exact lead is known here if the tracker sends with each frame: 7 ms of age and 41 ms to the picture.
     #[test]
     fn a_measured_lead_is_as_good_as_the_exact_one() {
-        let (none, exact, measured) =
-            (error_m(None, 16, 1.5), error_m(Some(Lead::Stated(0.048)), 16, 1.5), error_m(Some(Lead::Measured(0.0)), 16, 1.5));
+        let (none, exact, measured) = (
+            error_m(None, 16, 1.5),
+            error_m(Some(Lead::Stated(0.048)), 16, 1.5),
+            error_m(Some(Lead::Measured(0.0)), 16, 1.5),
+        );
         // a lag of 48 ms at 0.89 m/s rms is an error of 43 mm
         assert!((none - 0.0426).abs() < 0.001, "{none}");
         assert!(exact < none / 3.0 && (measured / exact - 1.0).abs() < 0.01, "{none} {exact} {measured}");
