@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `age` | known for each pose, by the clock of the server's machine |
 //! | `display` | until halfway between the first and the last facet that presents the frame, by the server's clock |
-//! | `stated` | everything that the run cannot see: the tracker before it sends, scan-out and projector |
+//! | `stated` | everything that the run cannot see: the tracker before it sends, the wait for the next refresh, scan-out and projector |
 
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tumble::collide::Pose;
 use tumble::net::sync::Input;
 
-/// Age of a pose up to which a head without a newer one is predicted on for each frame.
+/// Largest age of a pose that is predicted on. A head without a newer one stands: it counts as measured there anew.
 const MAX_AGE: Duration = Duration::from_millis(100);
 
 /// Smoothing and prediction that were asked for.
@@ -92,6 +92,7 @@ impl SmoothedUser {
         let mut input = Input { sequence: self.sequence, ..self.last.input.clone() };
         let mut lead_s = None;
         if let (Some(head), Some(at)) = (&mut input.head, self.last.head_received) {
+            let at = now.checked_sub(MAX_AGE).map_or(at, |oldest| at.max(oldest));
             let ahead = display.lead_s(lead, now.saturating_duration_since(at));
             *head = predicted(&mut self.filter, at.saturating_duration_since(start), head, ahead);
             lead_s = Some(ahead);
@@ -195,6 +196,29 @@ mod tests {
         let best = (0..=200).step_by(5).map(|ms| error_m(Some(Lead::Stated(1e-3 * f64::from(ms))), 50, 4.0));
         let best = best.fold(f64::INFINITY, f64::min);
         assert!(measured < 0.8 * best, "{measured} {best}");
+    }
+
+    /// A head that moves evenly and is then lost, while messages for the user go on: it goes back to its last pose.
+    #[test]
+    fn a_head_that_is_lost_stands_at_its_last_pose() {
+        for lead in [Lead::Stated(0.05), Lead::Measured(0.05)] {
+            let smoothing = Smoothing { rest_hz: None, beta: Smoothing::BETA };
+            let mut heads = SmoothedHeads::new(Some(HeadOptions { smoothing, lead }));
+            let start = heads.start;
+            let mut shown = Vec::new();
+            for k in 0..120 {
+                let (sent, now) = (start + millis(16 * k.min(60)), start + millis(16 * k));
+                let x = 0.016 * k.min(60) as f64;
+                let head =
+                    Some(Pose::from_parts(nalgebra::Vector3::new(x, 0.0, 1.7).into(), UnitQuaternion::identity()));
+                let (wand, hands, keys) = (None, [None; 2], Vec::new());
+                let input = Input { sequence: k, user: 0, head, wand, hands, buttons: 0, keys };
+                let tracked = TrackedInput { input, received: now, head_received: Some(sent) };
+                shown.push(heads.applied(vec![tracked], now)[0].input.head.unwrap().translation.x);
+            }
+            // 1 m/s for 50 ms
+            assert!((shown[60] - 0.96 - 0.05).abs() < 1e-3 && (shown[119] - 0.96).abs() < 1e-6, "{shown:?}");
+        }
     }
 
     #[test]
