@@ -224,7 +224,7 @@ fn the_picture_follows_the_tracked_eye() {
     assert!(seen, "the picture from the tracked eye did not come");
 }
 
-/// A head that sways by 0.3 m, once in 2 s, and a facet that presents a frame 40 ms after it was told to. The session
+/// A head that sways by 0.3 m, once in 2 s, and a facet that presents a frame 40 ms after its order. The session
 /// measures the lead, and the head of the frame is where the head is when the frame is presented; without a lead it is
 /// behind. A constant of the size that is measured does the same. Times are those that this test really took.
 #[test]

@@ -305,7 +305,7 @@ impl<'a> RunLoop<'a> {
         self.take_events()?;
         let browsers = |facet| processes.report_of(facet).browsers;
         let alarms = self.input_devices.alarms();
-        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s, browsers, &alarms);
+        self.status.at(&self.server, &self.metrics, frame, self.time_s, browsers, &alarms);
         Ok(true)
     }
 

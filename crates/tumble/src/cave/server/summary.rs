@@ -355,7 +355,6 @@ impl Status {
     pub fn at(
         &mut self,
         server: &Server<ServerEndpoint>,
-        slots: &[FacetSlot],
         metrics: &Metrics,
         frame: u64,
         time_s: f64,
@@ -379,8 +378,8 @@ impl Status {
             per_s(frame, self.frame),
             1e3 * metrics.step.quantile(0.5)
         );
-        self.shown.resize(slots.len(), 0);
-        for (k, slot) in slots.iter().enumerate() {
+        self.shown.resize(metrics.names.len(), 0);
+        for (k, name) in metrics.names.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);
             let membership = match server.membership(k as FacetNumber) {
                 Membership::Absent => "absent",
@@ -392,7 +391,7 @@ impl Status {
                 metrics.differences[k].as_ref().map_or(String::new(), |d| format!(", DIFFERS from frame {}", d.frame));
             text += &format!(
                 "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms{differs}{}\n",
-                slot.name,
+                name,
                 per_s(counts.presented, self.shown[k]),
                 counts.late + counts.missing,
                 counts.dropped,
@@ -402,6 +401,6 @@ impl Status {
         }
         alarms.iter().for_each(|alarm| text += &format!("\x1b[K  {alarm}\n"));
         eprint!("{}", if self.terminal { text } else { text.replace("\x1b[K", "") });
-        (self.lines, self.since, self.frame) = (slots.len() + 1 + alarms.len(), Instant::now(), frame);
+        (self.lines, self.since, self.frame) = (metrics.names.len() + 1 + alarms.len(), Instant::now(), frame);
     }
 }

@@ -23,7 +23,7 @@ struct State {
 }
 
 impl Presence {
-    /// Begins with a device that is neither connected nor absent.
+    /// Begins before the device was connected and before it was lost.
     pub fn new(name: String) -> Presence {
         Presence { name, state: Mutex::default() }
     }
