@@ -232,7 +232,7 @@ fn a_head_is_predicted_to_the_measured_time_of_the_picture() {
     const LATER: Duration = Duration::from_millis(40);
     let start = Instant::now();
     let sway = move |at: Instant| 0.3 * (std::f64::consts::PI * (at - start).as_secs_f64()).sin();
-    // rms error of the head at the presentation, m, and the summary
+    // median error of the head at the presentation, m, which frames that wait for a core do not move, and the summary
     let run = |name: &str, lead: &[&str]| -> (f64, Value) {
         let (folder, scene, cave) = place(name);
         let (sender, summary) = (Sender::new(), text(&folder.path("summary.json")));
@@ -249,7 +249,7 @@ fn a_head_is_predicted_to_the_measured_time_of_the_picture() {
                     std::thread::sleep(Duration::from_millis(8));
                 }
             });
-            let mut frames = 0;
+            let (began, mut frames) = (Instant::now(), 0);
             while frames < 120 {
                 match server.facet.next(Duration::from_millis(20)).unwrap() {
                     Task::Draw => {
@@ -263,18 +263,19 @@ fn a_head_is_predicted_to_the_measured_time_of_the_picture() {
                         server.facet.presented().unwrap();
                         frames += 1;
                         if frames > 30 {
-                            errors.push((head - sway(Instant::now())).powi(2));
+                            errors.push((head - sway(Instant::now())).abs());
                         }
                     }
                     Task::Wait(_) => {}
                     Task::Ended(why) => panic!("{why:?}"),
                 }
-                assert!(start.elapsed() < PATIENCE, "{frames} frames came");
+                assert!(began.elapsed() < PATIENCE, "{frames} frames came");
             }
             ended.store(true, std::sync::atomic::Ordering::Relaxed);
         });
         server.end();
-        ((errors.iter().sum::<f64>() / errors.len() as f64).sqrt(), json(summary.as_ref()))
+        errors.sort_by(f64::total_cmp);
+        (errors[errors.len() / 2], json(summary.as_ref()))
     };
     let (behind, _) = run("cave-lead-none", &[]);
     let (measured, figures) = run("cave-lead-auto", &["--tracker-lead", "auto"]);
@@ -282,6 +283,7 @@ fn a_head_is_predicted_to_the_measured_time_of_the_picture() {
     let (picture, lead) = (ms("frame_to_picture"), ms("tracker_lead"));
     assert!(picture > 40.0 && lead > picture && lead < picture + 20.0, "{figures}");
     let (stated, _) = run("cave-lead-stated", &["--tracker-lead", &format!("{lead:.1}")]);
+    println!("mm: {behind} {measured} {stated}, lead {lead} ms");
     assert!(measured < 0.4 * behind && measured < 1.5 * stated, "{behind} {measured} {stated}");
 }
 
