@@ -10,7 +10,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// Bytes of the head and the checksum.
 const BEFORE: usize = 16;
 /// Largest input: no archive of the seeds is longer.
-const MAX_BYTES: usize = 1 << 16;
+pub const MAX_BYTES: usize = 1 << 17;
 
 /// Returns the bytes with the head of the present format and their own checksum.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {

@@ -60,6 +60,18 @@ pub fn check_writable(path: &Path) -> Result<(), String> {
     Err(format!("{} cannot be written: {problem}", path.display()))
 }
 
+/// Refuses to replace a file without `--overwrite`. What is no regular file, such as `/dev/stdout`, is written directly
+/// and replaced by nothing.
+///
+/// # Errors
+/// Bad usage, with the path.
+pub fn check_replaceable(path: &Path, overwrite: bool) -> Result<(), Failure> {
+    match !overwrite && path.is_file() {
+        true => Err(Failure::input(format!("{}: exists already; --overwrite replaces it", path.display()))),
+        false => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! `tumble calibrate`: patterns of structured light, and caves of photographs of them.
 
 use crate::args::{CalibrateAction, CalibrateOptions, SolveOptions};
-use crate::atomic_file::write_file;
+use crate::atomic_file::{check_replaceable, write_file};
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::scene::cave::{Cave, resolve_cave};
@@ -14,12 +14,12 @@ const MAX_MARKS_BYTES: u64 = 1 << 20;
 /// Writes patterns, or measures a cave.
 pub fn calibrate(options: &CalibrateOptions) -> Result<(), Failure> {
     match &options.action {
-        CalibrateAction::Patterns { cave, output } => patterns(cave, output),
+        CalibrateAction::Patterns { cave, output, overwrite } => patterns(cave, output, *overwrite),
         CalibrateAction::Solve(options) => solve(options),
     }
 }
 
-fn patterns(name: &str, folder: &Path) -> Result<(), Failure> {
+fn patterns(name: &str, folder: &Path, overwrite: bool) -> Result<(), Failure> {
     let cave = resolve_cave(name)?.load()?;
     let mut count = 0;
     for facet in &cave.facets {
@@ -28,6 +28,7 @@ fn patterns(name: &str, folder: &Path) -> Result<(), Failure> {
         let sequence = Pattern::sequence(facet.size_px);
         for (i, pattern) in sequence.iter().enumerate() {
             let path = folder.join(format!("{i:02}_{}.png", pattern.name()));
+            check_replaceable(&path, overwrite)?;
             write_file(&path, &pattern.picture(facet).to_png().map_err(Failure::input)?)?;
         }
         count += sequence.len();
@@ -41,9 +42,7 @@ fn solve(options: &SolveOptions) -> Result<(), Failure> {
     let source = resolve_cave(&options.cave)?;
     let (cave, text) = (source.load()?, source.text()?);
     let path = options.output.join("cave.toml");
-    if path.exists() {
-        return Err(Failure::input(format!("{}: there is a cave already; name another folder", path.display())));
-    }
+    check_replaceable(&path, options.overwrite)?;
     let marks = options.marks.display().to_string();
     let marks = parse_marks(&marks_text(&options.marks)?, &marks).map_err(Failure::input)?;
     let views = photographs(&options.photos, &cave, &marks, |line| println!("{line}")).map_err(Failure::input)?;

@@ -1,7 +1,7 @@
 //! `tumble mpcdi`: caves of MPCDI archives and of configurations of SGCT, and archives of caves.
 
 use crate::args::MpcdiOptions;
-use crate::atomic_file::write_file;
+use crate::atomic_file::{check_replaceable, write_file};
 use crate::failure::Failure;
 use std::path::Path;
 use tumble::render::CaveView;
@@ -38,9 +38,7 @@ fn to_cave(options: &MpcdiOptions) -> Result<(), Failure> {
     };
     let made = made.map_err(|e| named(e.to_string()))?;
     let path = folder.join("cave.toml");
-    if path.exists() {
-        return Err(Failure::input(format!("{}: there is a cave already; name another folder", path.display())));
-    }
+    check_replaceable(&path, options.overwrite)?;
     std::fs::create_dir_all(folder)
         .map_err(|e| Failure::input(format!("{}: cannot be created: {e}", folder.display())))?;
     for (file, bytes) in &made.files {
@@ -54,6 +52,7 @@ fn to_cave(options: &MpcdiOptions) -> Result<(), Failure> {
 }
 
 fn to_archive(options: &MpcdiOptions) -> Result<(), Failure> {
+    check_replaceable(&options.output, options.overwrite)?;
     let cave = resolve_cave(&options.name)?.load()?;
     let named = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", options.name));
     let scene = SceneFile::parse("[cave]\norigin_m = [0, 0, 0]\n", "the origin")?;

@@ -216,10 +216,10 @@ impl<L: ServerLink> Server<L> {
         self.link.unknown_peers()
     }
 
-    /// Notes the arrival of an input that no facet sent, so that its latency is measured; see
+    /// Notes an input that no facet sent and that arrived this time ago, so that its latency is measured; see
     /// [`ServerSession::note_input`].
-    pub fn note_input(&mut self, user: u16, sequence: u64) {
-        self.session.note_input(self.now(), user, sequence);
+    pub fn note_input(&mut self, user: u16, sequence: u64, age: Duration) {
+        self.session.note_input(self.now().saturating_sub(age), user, sequence);
     }
 
     /// Returns the counts about a facet: the server's, the facet's own, and those of its link.

@@ -5,9 +5,7 @@ use std::path::Path;
 use tumble_core::collide::{RepairSettings, TriMesh, Vec3, decode_text};
 
 use crate::build::collada;
-
-/// Largest mesh file in bytes: 1 GiB.
-pub(crate) const MAX_MESH_BYTES: u64 = 1 << 30;
+use crate::open::plain::MAX_FILE_BYTES;
 
 /// Returns the bytes of a mesh file, at most 1 GiB. Pipes and devices, which could block the
 /// reader, are an error.
@@ -20,8 +18,8 @@ pub fn read_mesh_bytes(path: &Path) -> Result<Vec<u8>, String> {
     if !about.is_file() {
         return Err("cannot be read: it is not a regular file".into());
     }
-    if about.len() > MAX_MESH_BYTES {
-        return Err(format!("it has {} bytes; the limit is {MAX_MESH_BYTES}", about.len()));
+    if about.len() > MAX_FILE_BYTES {
+        return Err(format!("it has {} bytes; the limit is {MAX_FILE_BYTES}", about.len()));
     }
     std::fs::read(path).map_err(unread)
 }

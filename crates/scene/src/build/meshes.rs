@@ -7,10 +7,11 @@ use tumble_core::collide::{RepairSettings, Shape, ShapeError, TreeCache, TreeSet
 use crate::build::error::BuildError;
 use crate::build::grid::read_grid;
 use crate::build::heights::{HeightGrid, read_heights};
-use crate::build::mesh_files::{MAX_MESH_BYTES, make_solid, read_with_lines};
+use crate::build::mesh_files::{make_solid, read_with_lines};
 use crate::build::shapes::Purpose;
 use crate::build::slow::building_surface;
 use crate::notes::Notes;
+use crate::open::plain::MAX_FILE_BYTES;
 use crate::parse::file::SceneFile;
 use crate::parse::mesh::{MeshSource, MeshSpec};
 use crate::parse::terrain::{Heights, HullPoints};
@@ -145,8 +146,8 @@ impl SceneFile {
             source,
         };
         let size = std::fs::metadata(path).map_err(unread)?.len();
-        if size > MAX_MESH_BYTES {
-            return Err(wrong(format!("the file has {size} bytes; the limit is {MAX_MESH_BYTES}")));
+        if size > MAX_FILE_BYTES {
+            return Err(wrong(format!("the file has {size} bytes; the limit is {MAX_FILE_BYTES}")));
         }
         crate::read_file(path).map_err(unread)
     }

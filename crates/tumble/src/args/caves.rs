@@ -36,6 +36,9 @@ pub struct MpcdiOptions {
     /// The eye of the cave's user between the projectors, m: x right, y ahead, z up.
     #[arg(long, value_name = "X,Y,Z", default_value = "0,0,1.7", value_parser = point, allow_hyphen_values = true)]
     pub eye: [f64; 3],
+    /// Replace an archive or a cave that is there already. Without it such an output is refused.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 #[derive(Args)]
@@ -54,6 +57,9 @@ pub enum CalibrateAction {
         /// The folder that gets a folder of pictures for each facet.
         #[arg(long, short, value_name = "DIR", alias = "out")]
         output: PathBuf,
+        /// Replace pictures that are there already. Without it they are refused.
+        #[arg(long)]
+        overwrite: bool,
     },
     /// Make a cave file with warps and blends of photographs of the patterns
     Solve(SolveOptions),
@@ -81,4 +87,7 @@ pub struct SolveOptions {
     /// tilted as the photographs say; 0 takes them as exact.
     #[arg(long, value_name = "MM", default_value = "5", value_parser = millimeters)]
     pub screens_mm: f64,
+    /// Replace a cave that is there already. Without it it is refused.
+    #[arg(long)]
+    pub overwrite: bool,
 }

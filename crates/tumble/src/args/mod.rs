@@ -6,7 +6,7 @@ mod values;
 
 pub use caves::{CalibrateAction, CalibrateOptions, CavesOptions, MpcdiOptions, SolveOptions};
 pub use scene::{OpeningOptions, SceneOptions, kind};
-pub use values::{cutoff, gain, lead, rate, seconds, web_timeout};
+pub use values::{cutoff, gain, rate, seconds, web_timeout};
 
 use crate::cave::args::{
     CaveOptions, ConsoleOptions, FacetOptions, RecoverOptions, RelayOptions, ReplayOptions, ServeOptions,

@@ -37,10 +37,6 @@ pub fn cutoff(text: &str) -> Result<f64, String> {
     number(text, 0.01, 100.0)
 }
 
-pub fn lead(text: &str) -> Result<f64, String> {
-    number(text, 0.0, 200.0)
-}
-
 pub(super) fn millimeters(text: &str) -> Result<f64, String> {
     number(text, 0.0, 1000.0)
 }

@@ -1,8 +1,10 @@
 //! Options of `tumble cave`, `tumble serve`, `tumble facet`, `tumble replay` and `tumble recover`.
 
 use crate::args::{Overlays, SceneOptions};
+use crate::cave::tracker::lead::Lead;
 use crate::cave::tracker::one_euro::Smoothing;
 use crate::cave::tracker::sealed::MAX_RELAYS;
+use crate::cave::tracker::smoothed::HeadOptions;
 use clap::{Args, Subcommand, ValueEnum};
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -126,10 +128,11 @@ pub struct ServeOptions {
     /// Smooth tracked heads by a 1 € filter with this cutoff at rest, Hz; less is smoother, 1 to 2 suits heads.
     #[arg(long, value_name = "HZ", value_parser = crate::args::cutoff)]
     pub tracker_smooth: Option<f64>,
-    /// Draw tracked heads where they will be after this time, ms: from the measurement to the light of the
-    /// picture.
-    #[arg(long, value_name = "MS", value_parser = crate::args::lead)]
-    pub tracker_lead: Option<f64>,
+    /// Draw tracked heads where they will be when the picture is shown. auto measures the time from the receipt of a
+    /// pose to the presentation of its frame; auto+MS adds what the run cannot see, such as scan-out and projector;
+    /// MS alone is a constant, from the receipt.
+    #[arg(long, value_name = "auto|auto+MS|MS")]
+    pub tracker_lead: Option<Lead>,
     /// Send contacts to a sound engine at this address: impacts, slides and listeners as OSC over UDP.
     #[arg(long, value_name = "ADDR:PORT")]
     pub sound: Option<SocketAddr>,
@@ -446,9 +449,9 @@ pub struct FacetOptions {
 
 impl ServeOptions {
     /// Returns how tracked heads are smoothed and predicted; `None` for as they are.
-    pub fn smoothing(&self) -> Option<Smoothing> {
+    pub fn heads(&self) -> Option<HeadOptions> {
         let wanted = self.tracker_smooth.is_some() || self.tracker_lead.is_some();
-        let lead_s = 1e-3 * self.tracker_lead.unwrap_or(0.0);
-        wanted.then_some(Smoothing { rest_hz: self.tracker_smooth, beta: Smoothing::BETA, lead_s })
+        let smoothing = Smoothing { rest_hz: self.tracker_smooth, beta: Smoothing::BETA };
+        wanted.then_some(HeadOptions { smoothing, lead: self.tracker_lead.unwrap_or(Lead::Stated(0.0)) })
     }
 }

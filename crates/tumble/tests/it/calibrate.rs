@@ -57,7 +57,11 @@ fn patterns_as_photographs_give_a_warp_that_changes_nothing() {
         assert!(off < 0.3, "{i}: {u} {v}, {x} {y}");
     }
     // errors with their place
-    assert!(run(&solve(&file, &out), 2).contains("there is a cave already"));
+    assert!(run(&solve(&file, &out), 2).contains("cave.toml: exists already; --overwrite replaces it"));
+    let again = ["calibrate", "patterns", &cave, "--output", &patterns];
+    assert!(fail(&again, 2).contains(".png: exists already; --overwrite replaces it"));
+    succeed(&[&again[..], &["--overwrite"]].concat());
+    run(&[&solve(&file, &out)[..], &["--overwrite".into()]].concat(), 0);
     let three = folder.write("three.toml", &wanted[..wanted.len() * 3 / 4 - 10]);
     let said = run(&solve(&three, &text(&folder.path("b"))), 2);
     assert!(said.contains("three.toml:"), "{said}");

@@ -102,6 +102,31 @@ fn a_run_is_watched_and_directed_by_the_command() {
     place.assert_clean();
 }
 
+/// A VRPN server that is not there, and comes and goes while the run goes on.
+#[test]
+fn a_tracker_that_does_not_answer_is_an_alarm_until_it_does() {
+    let closed = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let tracker = format!("[tracker]\nvrpn = \"{closed}\"\nvrpn_map = [\"Glasses=u/head\"]\n");
+    let place = Place::new("console-vrpn", &(wall() + &tracker));
+    let run = place.start("cave", &["--no-pictures", "--console", "127.0.0.1:0"]);
+    let (at, token) = link(&place);
+    let alarm = || status(at, &token)["alarms"].to_string();
+    wait("the alarm", || alarm().contains(&format!("VRPN {closed}: Connection refused")));
+    let (code, _, wrong) = console(&place, at, &["status"]);
+    assert!(code == Some(1) && wrong.contains("VRPN"), "{wrong}");
+    let server = std::net::TcpListener::bind(closed).unwrap();
+    let (mut socket, _) = server.accept().unwrap();
+    socket.write_all(&tumble::net::vrpn::GREETING).unwrap();
+    wait("the end of the alarm", || alarm() == "[]");
+    drop((server, socket));
+    wait("the alarm", || alarm().contains("VRPN"));
+    let log = ask(at, &token, "GET", "/api/log").1;
+    let lost = log.matches("VRPN").count();
+    assert!(log.contains(&format!("VRPN {closed}: is connected")) && lost >= 3, "{log}");
+    assert_eq!(ask(at, &token, "POST", "/api/stop").0, 200);
+    assert_eq!(run.end().0, Some(0));
+}
+
 /// Pause and reset are inputs, so a recording that has them is run again to the same states.
 #[test]
 fn a_recording_with_pause_and_reset_is_run_again_to_the_same_states() {

@@ -14,9 +14,19 @@ fn a_cave_goes_to_an_archive_and_back() {
     assert!(said.contains("a cave of 1 facet on 1 screen"), "{said}");
     let written = std::fs::read_to_string(format!("{again}/cave.toml")).unwrap();
     assert!(written.contains("eye_m = [0.0, -0.5, 1.5]") && written.contains("shape = \"mesh\""), "{written}");
-    // nothing is overwritten
-    assert!(fail(&["mpcdi", &archive, "--output", &again], 2).contains("there is a cave already"));
-    assert!(fail(&["mpcdi", "panorama", "--output", &archive], 2).contains("facet \"panorama\": shows directions"));
+    // nothing is overwritten without the word for it
+    let before = std::fs::read(&archive).unwrap();
+    let refused = "exists already; --overwrite replaces it";
+    assert!(fail(&["mpcdi", &archive, "--output", &again], 2).contains(refused));
+    assert!(fail(&["mpcdi", "cube4", "--output", &archive], 2).contains(refused));
+    assert!(std::fs::read(&archive).unwrap() == before);
+    succeed(&["mpcdi", &archive, "--output", &again, "--overwrite"]);
+    let said = succeed(&["mpcdi", "cube4", "--output", &archive, "--overwrite"]);
+    assert!(said.contains("(4 projectors, profile a3)"), "{said}");
+    assert!(
+        fail(&["mpcdi", "panorama", "--output", &archive, "--overwrite"], 2)
+            .contains("facet \"panorama\": shows directions")
+    );
     std::fs::write(&archive, b"no zip").unwrap();
     let said = fail(&["mpcdi", &archive, "--output", &text(&folder.path("c"))], 2);
     assert!(said.contains("a.mpcdi: the archive: is no zip archive"), "{said}");

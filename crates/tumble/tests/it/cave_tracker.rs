@@ -2,14 +2,14 @@
 //! Control 1.0). Also replays of recorded user input.
 
 use crate::cave_place::in_place;
-use crate::cave_place::{Place, signal, wait, wall};
+use crate::cave_place::{Place, signal, states, wait, wall};
 use crate::cave_users::{SCENE, Server, one_screen, place};
 use crate::common::{json, text};
 use serde_json::{Value, json as value};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 use tumble::collide::Vec3;
-use tumble::net::sync::SessionReader;
+use tumble::net::sync::{SessionReader, Task};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -224,6 +224,98 @@ fn the_picture_follows_the_tracked_eye() {
     assert!(seen, "the picture from the tracked eye did not come");
 }
 
+/// A head that sways by 0.3 m, once in 2 s, and a facet that presents a frame 40 ms after its order. The session
+/// measures the lead, and the head of the frame is where the head is when the frame is presented; without a lead it is
+/// behind. A constant of the size that is measured does the same. Times are those that this test really took.
+#[test]
+fn a_head_is_predicted_to_the_measured_time_of_the_picture() {
+    const LATER: Duration = Duration::from_millis(40);
+    let start = Instant::now();
+    let sway = move |at: Instant| 0.3 * (std::f64::consts::PI * (at - start).as_secs_f64()).sin();
+    // median error of the head at the presentation, m, which frames that wait for a core do not move, and the summary
+    let run = |name: &str, lead: &[&str]| -> (f64, Value) {
+        let (folder, scene, cave) = place(name);
+        let (sender, summary) = (Sender::new(), text(&folder.path("summary.json")));
+        let to = sender.to.to_string();
+        let args = [&["--tracker", &to, "--summary", &summary][..], lead].concat();
+        let mut server = Server::start_in_real_time(&folder, &scene, &cave, &args);
+        let ended = std::sync::atomic::AtomicBool::new(false);
+        let mut errors = Vec::new();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !ended.load(std::sync::atomic::Ordering::Relaxed) {
+                    let head = [sway(Instant::now()) as f32, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0];
+                    sender.send(&floats("/tumble/user/u/head", &head));
+                    std::thread::sleep(Duration::from_millis(8));
+                }
+            });
+            let (began, mut frames) = (Instant::now(), 0);
+            while frames < 120 {
+                match server.facet.next(Duration::from_millis(20)).unwrap() {
+                    Task::Draw => {
+                        if server.facet.begin().is_some() {
+                            server.facet.drawn([0; 16]).unwrap();
+                        }
+                    }
+                    Task::Present(_) => {
+                        std::thread::sleep(LATER);
+                        let head = server.facet.viewer().users[0].head.translation.x;
+                        server.facet.presented().unwrap();
+                        frames += 1;
+                        if frames > 30 {
+                            errors.push((head - sway(Instant::now())).abs());
+                        }
+                    }
+                    Task::Wait(_) => {}
+                    Task::Ended(why) => panic!("{why:?}"),
+                }
+                assert!(began.elapsed() < PATIENCE, "{frames} frames came");
+            }
+            ended.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        server.end();
+        errors.sort_by(f64::total_cmp);
+        (errors[errors.len() / 2], json(summary.as_ref()))
+    };
+    let (behind, _) = run("cave-lead-none", &[]);
+    let (measured, figures) = run("cave-lead-auto", &["--tracker-lead", "auto"]);
+    let ms = |what: &str| figures[what]["p50_ms"].as_f64().unwrap();
+    let (picture, lead) = (ms("frame_to_picture"), ms("tracker_lead"));
+    assert!(picture > 40.0 && lead > picture && lead < picture + 20.0, "{figures}");
+    let (stated, _) = run("cave-lead-stated", &["--tracker-lead", &format!("{lead:.1}")]);
+    println!("mm: {behind} {measured} {stated}, lead {lead} ms");
+    assert!(measured < 0.4 * behind && measured < 1.5 * stated, "{behind} {measured} {stated}");
+}
+
+/// Heads are predicted once, by the server: nodes that step the world get them as inputs, and a recording has them.
+#[test]
+fn nodes_that_compute_and_replays_get_the_predicted_heads() {
+    let (place, sender) = (Place::new("tracker-everywhere", &wall()), Sender::new());
+    let path = |name: &str| place.path(name);
+    let common = ["--no-pictures", "--compute", "everywhere", "--user-colliders", "--record"];
+    let live = [&path("a.mcap"), "--log-dir", &path("out"), "--summary", &path("a.json"), "--duration", "2"];
+    let heads = ["--tracker", &sender.to.to_string(), "--tracker-lead", "auto+10", "--tracker-smooth", "2"];
+    let run = place.start("cave", &[&common[..], &live, &heads].concat());
+    let start = Instant::now();
+    while !place.folder.path("a.json").exists() {
+        assert!(start.elapsed() < PATIENCE, "the run does not end");
+        let x = (3.0 * start.elapsed().as_secs_f32()).sin() * 0.2;
+        sender.send(&floats("/tumble/user/u/head", &[x, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0]));
+        std::thread::sleep(Duration::from_millis(8));
+    }
+    assert_eq!(run.end().0, Some(0));
+    let summary = json(&place.folder.path("a.json"));
+    assert!(summary["tracker_lead"]["count"].as_u64() > Some(60), "{summary}");
+    let (left, right) = (place.log("out", "l"), place.log("out", "r"));
+    assert!(states(&left) == states(&right) && left.len() > 100);
+    for facet in summary["facets"].as_array().unwrap() {
+        assert_eq!((&facet["mismatched"], &facet["first_difference"]), (&0.into(), &Value::Null));
+    }
+    let again = [&path("b.mcap"), "--replay-input", &path("a.mcap"), "--no-realtime"];
+    let replayed = place.succeed("cave", &[&common[..], &again].concat())["replay_input"].clone();
+    assert!(replayed["different"] == 0 && replayed["same"].as_u64() > Some(100), "{replayed}");
+}
+
 /// The output of DTrack as its manual shows it: a body is the head, another one a hand.
 #[test]
 fn bodies_of_dtrack_move_heads_and_hands() {
@@ -267,13 +359,22 @@ fn what_users_did_is_done_again_bit_by_bit() {
         &folder,
         &scene,
         &cave,
-        &["--user-colliders", "--tracker", &sender.to.to_string(), "--record", &path("first.mcap")],
+        &[
+            "--user-colliders",
+            "--tracker",
+            &sender.to.to_string(),
+            "--tracker-lead",
+            "auto+10",
+            "--record",
+            &path("first.mcap"),
+        ],
     );
     server.show_until(150, |input| {
         input.keys = vec![if input.sequence % 40 < 30 { 0x1A } else { 0x04 }];
         let x = 0.01 * (input.sequence % 20) as f32;
         sender.send(&bundle(&[
             floats("/tumble/user/u/wand", &[x, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+            floats("/tumble/user/u/head", &[x, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0]),
             ints("/tumble/user/u/buttons", &[1]),
         ]));
     });

@@ -61,6 +61,28 @@ fn named_pipes_are_refused_and_not_waited_for() {
     }
 }
 
+/// A device without an end behind a symbolic link, as a file that a cave names. The command may have 8 GB of addresses,
+/// so that a reader without a limit fails soon.
+#[test]
+fn devices_behind_links_are_refused_and_not_read() {
+    let folder = Folder::new("devices");
+    for (key, name) in [("warp_file", "w.pfm"), ("blend_file", "b.png"), ("black_file", "k.png"), ("color", "c.cube")] {
+        std::os::unix::fs::symlink("/dev/zero", folder.path(name)).unwrap();
+        let value = if key == "color" { format!("{{ lut_file = \"{name}\" }}") } else { format!("\"{name}\"") };
+        let mask = if key == "black_file" { "blend_file = \"b.png\"\n" } else { "" };
+        let cave = crate::common::cave(&format!("size_px = [80, 60]\n{mask}{key} = {value}"));
+        let cave = folder.write(&format!("{key}.toml"), cave);
+        for args in [&["check", &cave][..], &["cave", "pendulum", "--cave", &cave, "--offscreen", "--duration", "0.02"]]
+        {
+            let line = format!("ulimit -v 8000000; exec {} {}", env!("CARGO_BIN_EXE_tumble"), args.join(" "));
+            let out = Command::new("sh").args(["-c", &line]).output().unwrap();
+            let wrong = String::from_utf8_lossy(&out.stderr);
+            assert_eq!(out.status.code(), Some(2), "tumble {args:?}: {wrong}");
+            assert!(wrong.contains("regular file") || wrong.contains("PNG"), "tumble {args:?}: {wrong}");
+        }
+    }
+}
+
 #[test]
 fn a_pipe_that_somebody_writes_to_is_read() {
     let folder = Folder::new("open-pipe");

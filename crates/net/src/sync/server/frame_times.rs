@@ -17,7 +17,7 @@
 //! | t1, T2 | STATE or PRESENT is sent and received |
 //! | T3, t4 | the frame is drawn or shown, and READY or PRESENTED is received |
 //! | delay | travel time of both messages; of the last exchanges the one with the smallest delay counts, because its error bound is the smallest |
-//! | input | time of the oldest input that this frame is the first to show: by the clock of the facet that sent it, otherwise its arrival at the server |
+//! | input | time of the oldest input that this frame is the first to show: by the clock of the facet that sent it, otherwise its arrival at the server's machine |
 
 use super::super::messages::FrameAck;
 use super::super::viewer::Viewer;
@@ -42,6 +42,8 @@ pub struct FrameTimes {
     pub facets: usize,
     /// Time from the first to the last facet that showed it.
     pub skew: Duration,
+    /// Time of the last facet that showed it, by the server's clock.
+    pub shown: Duration,
     /// Error bound of the skew: the sum of the bounds of the two clock offsets.
     pub error: Duration,
     /// Time from the input to the last facet that showed it. Only for the first frame that shows an
@@ -162,6 +164,7 @@ impl OpenFrame {
             frame,
             facets,
             skew: between(first.0, last.0),
+            shown: between(0, last.0),
             error,
             input: input.map(|input| between(input, last.0)),
         })

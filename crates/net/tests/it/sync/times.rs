@@ -88,7 +88,7 @@ fn from_what_a_user_does_to_the_picture_that_shows_it() {
     assert_eq!(timed.len(), 2, "{timed:?}");
     for (t, since) in timed.iter().zip([sent, came]) {
         let shown = truth(&stage, t.frame).into_iter().max().unwrap();
-        assert_eq!(t.input, Some(shown - since), "frame {}", t.frame);
+        assert_eq!((t.input, t.shown), (Some(shown - since), shown), "frame {}", t.frame);
     }
     assert!(timed[1].input.unwrap() > 50 * MS, "three frames of 16 ms and the screen: {:?}", timed[1].input);
 }

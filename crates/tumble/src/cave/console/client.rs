@@ -102,13 +102,14 @@ fn lines(status: &Value) -> String {
     let number = |value: &Value, digits: usize| format!("{:.digits$}", value.as_f64().unwrap_or(0.0));
     let word = |value: &Value| value.as_str().unwrap_or("").to_owned();
     let mut text = format!(
-        "{} in {}: frame {}, t = {} s, {} frames/s, {} s behind{}{}",
+        "{} in {}: frame {}, t = {} s, {} frames/s, {} s behind{}{}{}",
         word(&status["scene"]),
         word(&status["cave"]),
         status["frame"],
         number(&status["simulated_s"], 2),
         number(&status["frames_per_s"], 1),
         number(&status["behind_s"], 2),
+        status["tracker_lead_ms"].as_f64().map_or(String::new(), |ms| format!(", heads predicted by {ms:.1} ms")),
         if status["paused"] == true { ", paused" } else { "" },
         status["recording"].as_str().map_or(String::new(), |file| format!(", recording {file}")),
     );

@@ -21,6 +21,10 @@ pub struct ConsoleStatus {
     pub skew_ms: Option<f64>,
     /// Median time from an input to the last facet that shows it.
     pub input_to_picture_ms: Option<f64>,
+    /// Median time from taking the inputs for a frame to its presentation.
+    pub frame_to_picture_ms: Option<f64>,
+    /// Median time by which heads are predicted.
+    pub tracker_lead_ms: Option<f64>,
     pub paused: bool,
     /// Whether recorded frames are shown.
     pub replaying: bool,

@@ -97,6 +97,8 @@ impl RunLoop<'_> {
             frame: self.metrics.frame.quantiles(),
             skew: self.metrics.skew.non_empty(),
             input_to_picture: self.metrics.input.non_empty(),
+            frame_to_picture: self.metrics.picture.non_empty(),
+            tracker_lead: self.metrics.lead.non_empty(),
             replay: self.replay.as_ref().map(|replay| replay.counts),
             replay_input: self.input_devices.replayed_counts(),
             tracker: self.input_devices.tracker_counts(),

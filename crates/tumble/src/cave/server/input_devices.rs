@@ -7,12 +7,14 @@ use crate::cave::gamepad::{Gamepad, user_of};
 use crate::cave::replay::replayed_input::{self, ReplayedInput};
 use crate::cave::tracker::openxr_client::OpenXrClient;
 use crate::cave::tracker::osc;
+use crate::cave::tracker::presence::Presence;
+use crate::cave::tracker::smoothed::{AppliedInput, SmoothedHeads};
 use crate::cave::tracker::socket::{TrackerSocket, configured};
 use crate::cave::tracker::vrpn_client::VrpnClient;
 use crate::failure::Failure;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tumble::net::sync::transport::FacetNumber;
-use tumble::net::sync::{FrameRecord, Input};
+use tumble::net::sync::{FrameRecord, FrameTimes, Input};
 use tumble::scene::cave::{Cave, Tracker};
 
 /// Source number of the tracker; no facet has it.
@@ -27,6 +29,9 @@ pub struct InputDevices {
     openxr: Option<OpenXrClient>,
     gamepad: Option<Gamepad>,
     replayed_input: Option<ReplayedInput>,
+    heads: SmoothedHeads,
+    /// Time at which the inputs of the next frame were taken, by the server's clock.
+    taken: Option<Duration>,
 }
 
 impl InputDevices {
@@ -37,7 +42,7 @@ impl InputDevices {
         scene: [u8; 32],
         simulating: bool,
     ) -> Result<InputDevices, Failure> {
-        let key = key(cave)?;
+        let (key, heads) = (key(cave)?, SmoothedHeads::new(options.heads()));
         let replayed_input = options.replay_input.as_ref().map(|path| ReplayedInput::open(path, scene)).transpose()?;
         let live = replayed_input.is_none() && simulating;
         let about = cave.tracker.clone().unwrap_or_else(|| Tracker::of(&cave.users));
@@ -55,13 +60,11 @@ impl InputDevices {
         let gamepad = gamepad.filter(|_| live).map(|user| Gamepad::new(user, options.quiet));
         let wanted = configured(cave, options.tracker, &options.tracker_from, &options.dtrack_map)?
             .filter(|_| live && vrpn.is_none() && openxr.is_none());
-        let open = |tracker| TrackerSocket::open(tracker, key.as_ref(), options.smoothing());
+        let open = |tracker| TrackerSocket::open(tracker, key.as_ref());
         let tracker = wanted.as_ref().map(open).transpose()?;
-        let connect = |(server, maps): (&String, &Vec<_>)| {
-            VrpnClient::open(server, maps, &about, options.smoothing(), options.quiet)
-        };
+        let connect = |(server, maps): (&String, &Vec<_>)| VrpnClient::open(server, maps, &about);
         let vrpn = vrpn.filter(|_| live).map(connect).transpose()?;
-        let follow = |user: &String| OpenXrClient::open(user, &about, options.smoothing(), options.quiet);
+        let follow = |user: &String| OpenXrClient::open(user, &about);
         let openxr = openxr.filter(|_| live).map(follow).transpose()?;
         if let (Some(socket), Some(tracker), false) = (&tracker, &wanted, options.quiet) {
             eprintln!("{}", socket.describe(tracker));
@@ -69,7 +72,7 @@ impl InputDevices {
         if let (Some(path), false) = (&options.replay_input, options.quiet) {
             eprintln!("input: replayed from {}; live input of windows and trackers is ignored", path.display());
         }
-        Ok(InputDevices { tracker, vrpn, openxr, gamepad, replayed_input })
+        Ok(InputDevices { tracker, vrpn, openxr, gamepad, replayed_input, heads, taken: None })
     }
 
     /// Returns whether input of facets is used.
@@ -82,15 +85,44 @@ impl InputDevices {
         self.replayed_input.as_ref().is_some_and(ReplayedInput::is_over)
     }
 
-    /// Returns the inputs of tracker and gamepad since the last frame.
-    pub fn inputs(&mut self) -> Vec<(FacetNumber, Input)> {
+    /// Returns the inputs of tracker and gamepad for the next frame, which begins at this time of the server's clock.
+    pub fn inputs(&mut self, begin: Duration) -> Vec<(FacetNumber, AppliedInput)> {
+        let now = Instant::now();
+        self.taken = Some(begin);
         let tracked = self.tracker.iter().flat_map(TrackerSocket::inputs);
         let tracked = tracked.chain(self.vrpn.iter().flat_map(VrpnClient::inputs));
-        let tracked = tracked.chain(self.openxr.iter().flat_map(OpenXrClient::inputs));
-        let tracked = tracked.map(|input| (TRACKER_SOURCE, input));
-        let now = Instant::now();
+        let tracked = tracked.chain(self.openxr.iter().flat_map(OpenXrClient::inputs)).collect();
+        let tracked = self.heads.applied(tracked, now).into_iter().map(|applied| (TRACKER_SOURCE, applied));
         let held = self.gamepad.iter_mut().filter_map(|gamepad| gamepad.input(now));
-        tracked.chain(held.map(|input| (GAMEPAD_SOURCE, input))).collect()
+        let held = held.map(|input| AppliedInput { input, age: Some(Duration::ZERO), lead_s: None });
+        tracked.chain(held.map(|applied| (GAMEPAD_SOURCE, applied))).collect()
+    }
+
+    /// Notes the number of the frame for which inputs were taken.
+    pub fn published(&mut self, frame: Option<u64>) {
+        if let (Some(frame), Some(taken)) = (frame, self.taken.take()) {
+            self.heads.display.begun(frame, taken);
+        }
+    }
+
+    /// Returns the time from taking the inputs of a frame to its presentation, s, and predicts heads by it.
+    pub fn shown(&mut self, times: &FrameTimes) -> Option<f64> {
+        self.heads.display.shown(times)
+    }
+
+    /// Returns the devices that come and go.
+    fn presences(&self) -> impl Iterator<Item = &Presence> {
+        self.vrpn.iter().map(VrpnClient::presence).chain(self.openxr.iter().map(OpenXrClient::presence))
+    }
+
+    /// Returns the alarms of devices that do not answer.
+    pub fn alarms(&self) -> Vec<String> {
+        self.presences().filter_map(Presence::alarm).collect()
+    }
+
+    /// Returns the lines about devices since the last call.
+    pub fn lines(&self) -> Vec<String> {
+        self.presences().flat_map(Presence::lines).collect()
     }
 
     /// Returns the recorded inputs from this frame to the next. `simulated` is called only if there

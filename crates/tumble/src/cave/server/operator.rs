@@ -194,11 +194,13 @@ impl RunLoop<'_> {
             simulation_ms: 1e3 * self.metrics.step.quantile(0.5),
             skew_ms: median(&self.metrics.skew),
             input_to_picture_ms: median(&self.metrics.input),
+            frame_to_picture_ms: median(&self.metrics.picture),
+            tracker_lead_ms: median(&self.metrics.lead),
             paused: self.simulation.is_paused(),
             pattern: processes.pattern().map(str::to_owned),
             replaying: self.replay.is_some(),
             recording: self.recorder.file().map(|file| file.display().to_string()),
-            alarms: facets.iter().flat_map(FacetStatus::alarms).collect(),
+            alarms: facets.iter().flat_map(FacetStatus::alarms).chain(self.input_devices.alarms()).collect(),
             facets,
         };
         let shown = (0..self.slots.len()).map(|k| self.server.counts(k as FacetNumber).0.presented).collect();

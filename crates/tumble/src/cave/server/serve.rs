@@ -14,6 +14,7 @@ use crate::cave::replay::frames::Replay;
 use crate::cave::run_setup::RunSetup;
 use crate::cave::signals::Signals;
 use crate::cave::simulation::{CaveSimulation, OPERATOR_SOURCE, PACE_SOURCE};
+use crate::cave::tracker::smoothed::AppliedInput;
 use crate::divergence;
 use crate::failure::Failure;
 use std::path::PathBuf;
@@ -263,8 +264,11 @@ impl<'a> RunLoop<'a> {
         if recorded.is_none() && frame > 0 {
             // inputs since the last frame take effect in this one
             self.take_events()?;
-            let held = self.input_devices.inputs();
-            held.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
+            for (from, AppliedInput { input, age, lead_s }) in self.input_devices.inputs(self.server.now()) {
+                age.into_iter().for_each(|age| self.server.note_input(input.user, input.sequence, age));
+                lead_s.into_iter().for_each(|lead_s| self.metrics.lead.add(lead_s, frame, self.time_s));
+                self.take_input(from, input)?;
+            }
             if let Some(pace) = self.pace(steps) {
                 self.take_input(PACE_SOURCE, pace)?;
             }
@@ -281,6 +285,7 @@ impl<'a> RunLoop<'a> {
             None => {
                 self.server.begin_simulation(&self.simulation).map_err(failed)?;
                 self.inputs.clear();
+                self.input_devices.published(self.server.session().frame());
                 self.wait(processes)?;
                 self.time_s = self.simulation.world.time();
                 self.live_viewers.frame(&self.simulation.world);
@@ -291,10 +296,16 @@ impl<'a> RunLoop<'a> {
         self.recorder.frame(&self.simulation.world, self.server.session());
         let session = self.server.session();
         let replayed_input = self.input_devices.after(|| session.recorded(false))?;
-        replayed_input.into_iter().try_for_each(|(from, input)| self.take_input(from, input))?;
+        for (from, input) in replayed_input {
+            if from != PACE_SOURCE && from != OPERATOR_SOURCE {
+                self.server.note_input(input.user, input.sequence, Duration::ZERO);
+            }
+            self.take_input(from, input)?;
+        }
         self.take_events()?;
         let browsers = |facet| processes.report_of(facet).browsers;
-        self.status.at(&self.server, &self.slots, &self.metrics, frame, self.time_s, browsers);
+        let alarms = self.input_devices.alarms();
+        self.status.at(&self.server, &self.metrics, frame, self.time_s, browsers, &alarms);
         Ok(true)
     }
 
@@ -317,8 +328,14 @@ impl<'a> RunLoop<'a> {
         let mut events = self.server.events();
         events.retain(|event| self.input_devices.live() || !matches!(event, ServerEvent::Input(..)));
         self.recorder.events(&events);
+        self.input_devices.lines().into_iter().for_each(|line| self.say(&line));
         for event in events {
             self.metrics.take(&event, self.time_s);
+            if let ServerEvent::Shown(times) = &event
+                && let Some(took_s) = self.input_devices.shown(times)
+            {
+                self.metrics.picture.add(took_s, times.frame, self.time_s);
+            }
             self.replay.iter_mut().for_each(|replay| replay.take(&event));
             let slot = |k: &u16| self.slots.get(*k as usize).map_or("", |s| s.name.as_str());
             let said = match &event {
@@ -336,13 +353,7 @@ impl<'a> RunLoop<'a> {
                 }
                 _ => None,
             };
-            if let Some(said) = said {
-                self.operator.log(&said);
-                if !self.options.quiet {
-                    eprintln!("{said}");
-                    self.status.interrupted();
-                }
-            }
+            said.into_iter().for_each(|said| self.say(&said));
             if let ServerEvent::Input(from, input) = event {
                 self.act(from, input)?;
             }
@@ -350,11 +361,17 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
+    /// Prints a line, and adds it to the console's log.
+    fn say(&mut self, line: &str) {
+        self.operator.log(line);
+        if !self.options.quiet {
+            eprintln!("{line}");
+            self.status.interrupted();
+        }
+    }
+
     /// Takes an input of a device other than a facet's window.
     pub fn take_input(&mut self, from: FacetNumber, input: Input) -> Result<(), Failure> {
-        if from != PACE_SOURCE && from != OPERATOR_SOURCE {
-            self.server.note_input(input.user, input.sequence);
-        }
         self.recorder.events(&[ServerEvent::Input(from, input.clone())]);
         self.act(from, input)
     }

@@ -33,6 +33,10 @@ pub struct Metrics {
     pub skew: Histogram,
     /// From an input to the last facet that shows it.
     pub input: Histogram,
+    /// From taking the inputs for a frame to its presentation, halfway between the first and the last facet.
+    pub picture: Histogram,
+    /// Time by which heads are predicted.
+    pub lead: Histogram,
     /// By slot: from the arrival of a frame at the facet to the end of drawing.
     draw: Vec<Histogram>,
     /// By slot: the last frame drawn or shown, and the time of drawing, ms.
@@ -82,6 +86,10 @@ pub struct Summary {
     pub skew: Option<Quantiles>,
     /// From an input to the last facet that shows it, if there was input.
     pub input_to_picture: Option<Quantiles>,
+    /// From taking the inputs for a frame to its presentation, if live inputs were taken.
+    pub frame_to_picture: Option<Quantiles>,
+    /// Time by which heads were predicted, if they were.
+    pub tracker_lead: Option<Quantiles>,
     /// Replay: pictures compared with the recording.
     pub replay: Option<Counts>,
     /// Replayed inputs: states compared with the recording.
@@ -242,6 +250,10 @@ impl Summary {
         if let Some(input) = &self.input_to_picture {
             text += &quantiles("input to picture", input);
         }
+        if let Some(lead) = &self.tracker_lead {
+            let measured = self.frame_to_picture.iter().map(|taken| quantiles("taken by a frame and shown", taken));
+            text += &measured.chain([quantiles("lead of the heads", lead)]).collect::<String>();
+        }
         if let Some(Counts { same, different, not_compared }) = self.replay {
             text += &format!(
                 "pictures: {same} identical to the recording, {different} different, {not_compared} not compared\n"
@@ -339,15 +351,15 @@ impl Status {
         self.lines = 0;
     }
 
-    /// Updates the status lines after a frame.
+    /// Updates the status lines after a frame. `alarms` are those of input devices.
     pub fn at(
         &mut self,
         server: &Server<ServerEndpoint>,
-        slots: &[FacetSlot],
         metrics: &Metrics,
         frame: u64,
         time_s: f64,
         browsers: impl Fn(FacetNumber) -> Option<BrowserReport>,
+        alarms: &[String],
     ) {
         let passed = self.since.elapsed();
         let every = if self.terminal { EVERY / 5 } else { EVERY };
@@ -360,13 +372,14 @@ impl Status {
             histogram.non_empty().map_or(String::new(), |f| format!(", {what} {:.2} ms", f.p50_ms))
         };
         let (skew, input) = (more("skew", &metrics.skew), more("input to picture", &metrics.input));
+        let lead = more("lead of the heads", &metrics.lead);
         text += &format!(
-            "\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}\n",
+            "\x1b[Kframe {frame}, t = {time_s:.2} s, {:.1} frames/s, simulated in {:.2} ms{skew}{input}{lead}\n",
             per_s(frame, self.frame),
             1e3 * metrics.step.quantile(0.5)
         );
-        self.shown.resize(slots.len(), 0);
-        for (k, slot) in slots.iter().enumerate() {
+        self.shown.resize(metrics.names.len(), 0);
+        for (k, name) in metrics.names.iter().enumerate() {
             let (counts, _, _) = server.counts(k as FacetNumber);
             let membership = match server.membership(k as FacetNumber) {
                 Membership::Absent => "absent",
@@ -378,7 +391,7 @@ impl Status {
                 metrics.differences[k].as_ref().map_or(String::new(), |d| format!(", DIFFERS from frame {}", d.frame));
             text += &format!(
                 "\x1b[K  {:<12} {membership:<8} frame {last}, {:.1} frames/s, {} late, dropped {} times, drawn in {took_ms:.2} ms{differs}{}\n",
-                slot.name,
+                name,
                 per_s(counts.presented, self.shown[k]),
                 counts.late + counts.missing,
                 counts.dropped,
@@ -386,7 +399,8 @@ impl Status {
             );
             self.shown[k] = counts.presented;
         }
+        alarms.iter().for_each(|alarm| text += &format!("\x1b[K  {alarm}\n"));
         eprint!("{}", if self.terminal { text } else { text.replace("\x1b[K", "") });
-        (self.lines, self.since, self.frame) = (slots.len() + 1, Instant::now(), frame);
+        (self.lines, self.since, self.frame) = (metrics.names.len() + 1 + alarms.len(), Instant::now(), frame);
     }
 }

@@ -4,11 +4,13 @@
 pub mod budget;
 mod dtrack;
 mod headset;
+pub mod lead;
 pub mod one_euro;
 pub mod openxr_client;
 pub mod osc;
+pub mod presence;
 pub mod relay;
 pub mod sealed;
-mod smoothed;
+pub mod smoothed;
 pub mod socket;
 pub mod vrpn_client;

@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `f₀` | cutoff at rest, Hz |
 //! | `β` | Hz per m/s for positions, Hz per rad/s for rotations |
-//! | `lead` | time from the measurement to the light of the picture, s |
+//! | `lead` | time from the measurement to the light of the picture, s, given with each pose |
 //!
 //! The paper smooths velocities with 1 Hz, which lags behind a turning head by 0.16 s. For prediction it is 5 Hz here.
 
@@ -42,8 +42,6 @@ pub struct Smoothing {
     pub rest_hz: Option<f64>,
     /// Hz per m/s, and per rad/s.
     pub beta: f64,
-    /// Time to predict, s.
-    pub lead_s: f64,
 }
 
 impl Smoothing {
@@ -67,8 +65,9 @@ impl PoseFilter {
         PoseFilter { smoothing, last: None, velocity: [0.0; 3], turning: [0.0; 3] }
     }
 
-    /// Takes the pose at a time, s, and returns the one to show.
-    pub fn next(&mut self, time_s: f64, measured: Placed) -> Placed {
+    /// Takes the pose at a time, s, and returns the one to show `lead_s` later. The same time again returns the pose that
+    /// it had then, with another lead.
+    pub fn next(&mut self, time_s: f64, measured: Placed, lead_s: f64) -> Placed {
         let (before, raw, last) = match self.last {
             Some(last) if (0.0..=FORGET_S).contains(&(time_s - last.0)) => last,
             _ => {
@@ -78,7 +77,7 @@ impl PoseFilter {
         };
         let dt = time_s - before;
         if dt < SHORTEST_S {
-            return self.predicted(last);
+            return self.predicted(last, lead_s);
         }
         let (step, turn) = between(&last, &measured);
         let (moved, turned) = between(&raw, &measured);
@@ -97,12 +96,12 @@ impl PoseFilter {
             rotation: product(of_vector(turn.map(|t| b * t)), last.rotation),
         };
         self.last = Some((time_s, measured, filtered));
-        self.predicted(filtered)
+        self.predicted(filtered, lead_s)
     }
 
-    fn predicted(&self, from: Placed) -> Placed {
+    fn predicted(&self, from: Placed, lead_s: f64) -> Placed {
         let ahead = |v: [f64; 3], most: f64| {
-            let way = v.map(|v| v * self.smoothing.lead_s);
+            let way = v.map(|v| v * lead_s);
             let size = norm(way);
             if size > most { way.map(|w| w * most / size) } else { way }
         };
@@ -172,8 +171,8 @@ mod tests {
         2.0 * q[2].atan2(q[3])
     }
 
-    fn smoothing(rest_hz: Option<f64>, lead_s: f64) -> Smoothing {
-        Smoothing { rest_hz, beta: 5.0, lead_s }
+    fn smoothing(rest_hz: Option<f64>) -> Smoothing {
+        Smoothing { rest_hz, beta: 5.0 }
     }
 
     /// Noise of 1 mm at rest, by the closed form of a low-pass: the variance is that of the input times
@@ -185,11 +184,11 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             ((seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * 1e-3
         };
-        let mut filter = PoseFilter::new(Smoothing { beta: 0.0, ..smoothing(Some(1.0), 0.0) });
+        let mut filter = PoseFilter::new(Smoothing { beta: 0.0, ..smoothing(Some(1.0)) });
         let (mut sum, mut count) = (0.0, 0);
         for i in 0..200_000 {
             let measured = Placed { position: [random(), 0.0, 0.0], rotation: about_z(0.0) };
-            let shown = filter.next(f64::from(i) / RATE, measured).position[0];
+            let shown = filter.next(f64::from(i) / RATE, measured, 0.0).position[0];
             if i > 1000 {
                 (sum, count) = (sum + shown * shown, count + 1);
             }
@@ -205,12 +204,12 @@ mod tests {
     #[test]
     fn even_motion_is_predicted() {
         let lead = 0.04;
-        let mut filter = PoseFilter::new(smoothing(None, lead));
+        let mut filter = PoseFilter::new(smoothing(None));
         let at = |t: f64| Placed { position: [0.8 * t, -0.3 * t, 1.7], rotation: about_z(1.5 * t) };
         let mut worst: f64 = 0.0;
         for i in 0..600 {
             let t = f64::from(i) / RATE;
-            let (shown, wanted) = (filter.next(t, at(t)), at(t + lead));
+            let (shown, wanted) = (filter.next(t, at(t), lead), at(t + lead));
             if t > 1.0 {
                 worst = worst.max((shown.position[0] - wanted.position[0]).abs());
                 let turn = product(shown.rotation, conjugate(wanted.rotation));
@@ -225,39 +224,39 @@ mod tests {
     #[test]
     fn prediction_removes_most_of_the_lag_of_a_turning_head() {
         let at = |t: f64| 0.52 * (std::f64::consts::PI * t).sin();
-        let error = |smoothing: Smoothing| {
-            let mut filter = PoseFilter::new(smoothing);
+        let error = |rest_hz: Option<f64>, lead: f64| {
+            let mut filter = PoseFilter::new(smoothing(rest_hz));
             let (mut sum, mut count) = (0.0, 0);
             for i in 0..1200 {
                 let t = f64::from(i) / RATE;
-                let shown = filter.next(t, Placed { position: [0.0; 3], rotation: about_z(at(t)) });
+                let shown = filter.next(t, Placed { position: [0.0; 3], rotation: about_z(at(t)) }, lead);
                 if t > 1.0 {
                     (sum, count) = (sum + (angle(shown.rotation) - at(t + 0.04)).powi(2), count + 1);
                 }
             }
             (sum / f64::from(count)).sqrt().to_degrees()
         };
-        let (late, ahead, both) =
-            (error(smoothing(None, 0.0)), error(smoothing(None, 0.04)), error(smoothing(Some(1.5), 0.04)));
+        let (late, ahead, both) = (error(None, 0.0), error(None, 0.04), error(Some(1.5), 0.04));
         assert!((late - 2.65).abs() < 0.1, "{late}");
         assert!(ahead < late / 3.0 && both < late, "{late} {ahead} {both}");
     }
 
     #[test]
     fn pauses_jumps_and_repeated_times_are_harmless() {
-        let mut filter = PoseFilter::new(smoothing(Some(1.0), 0.05));
+        let mut filter = PoseFilter::new(smoothing(Some(1.0)));
         let placed = |x: f64| Placed { position: [x, 0.0, 0.0], rotation: about_z(x) };
-        filter.next(0.0, placed(0.0));
-        let same = filter.next(0.0, placed(5.0));
+        let mut next = |time_s: f64, at: Placed| filter.next(time_s, at, 0.05);
+        next(0.0, placed(0.0));
+        let same = next(0.0, placed(5.0));
         assert_eq!(same, placed(0.0));
         // a jump of 5 m is predicted on by 0.3 m at most
-        let jumped = filter.next(0.01, placed(5.0));
+        let jumped = next(0.01, placed(5.0));
         assert!(jumped.position[0] <= 5.3, "{jumped:?}");
         // after a pause it begins anew, and at times that go back
-        assert_eq!(filter.next(9.0, placed(-2.0)), placed(-2.0));
-        assert_eq!(filter.next(1.0, placed(3.0)), placed(3.0));
+        assert_eq!(next(9.0, placed(-2.0)), placed(-2.0));
+        assert_eq!(next(1.0, placed(3.0)), placed(3.0));
         // the other sign of a quaternion is the same rotation
-        let shown = filter.next(1.01, Placed { rotation: about_z(3.0).map(|c| -c), ..placed(3.0) });
+        let shown = next(1.01, Placed { rotation: about_z(3.0).map(|c| -c), ..placed(3.0) });
         assert!(shown.rotation.iter().all(|c| c.is_finite()));
         assert!(norm(rotation_vector(product(shown.rotation, conjugate(about_z(3.0))))) < 1e-9);
     }

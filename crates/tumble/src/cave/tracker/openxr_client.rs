@@ -5,19 +5,17 @@
 //! created again every two seconds.
 
 use super::headset::{HeadsetSession, Runtime, Sample};
-use super::one_euro::Smoothing;
-use super::osc::{Counts, OscDecoder};
-use super::smoothed::SmoothedHeads;
+use super::osc::{Counts, OscDecoder, TrackedInput};
+use super::presence::Presence;
 use super::socket::{POLL_INTERVAL, lock};
 use crate::failure::Failure;
 use rosc::{OscMessage, OscType};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use tumble::net::sync::Input;
 use tumble::scene::cave::{Axes, Tracker};
 
 /// Time that a runtime has to be loaded before the run goes on without it.
@@ -32,7 +30,7 @@ const END_TIMEOUT: Duration = Duration::from_secs(2);
 /// A headset and its thread.
 pub struct OpenXrClient {
     decoder: Arc<Mutex<OscDecoder>>,
-    heads: Mutex<SmoothedHeads>,
+    presence: Arc<Presence>,
     end: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -43,29 +41,20 @@ impl OpenXrClient {
     /// # Errors
     /// A user that the tracker does not have; a machine without loader or runtime, or with one that cannot do without
     /// graphics.
-    pub fn open(
-        user: &str,
-        tracker: &Tracker,
-        smoothing: Option<Smoothing>,
-        quiet: bool,
-    ) -> Result<OpenXrClient, Failure> {
-        OpenXrClient::open_library(None, user, tracker, smoothing, quiet)
+    pub fn open(user: &str, tracker: &Tracker) -> Result<OpenXrClient, Failure> {
+        OpenXrClient::open_library(None, user, tracker)
     }
 
-    fn open_library(
-        library: Option<PathBuf>,
-        user: &str,
-        tracker: &Tracker,
-        smoothing: Option<Smoothing>,
-        quiet: bool,
-    ) -> Result<OpenXrClient, Failure> {
+    fn open_library(library: Option<PathBuf>, user: &str, tracker: &Tracker) -> Result<OpenXrClient, Failure> {
         if !tracker.users.iter().any(|known| known == user) {
             let users = tracker.users.join(", ");
             return Err(Failure::input(format!("--openxr {user}: there is no such user; there are {users}")));
         }
         let tracker = Tracker { axes: Axes::YUp, ..tracker.clone() };
         let (decoder, end) = (Arc::new(Mutex::new(OscDecoder::new(&tracker))), Arc::new(AtomicBool::new(false)));
-        let follower = Follower { user: user.into(), decoder: decoder.clone(), end: end.clone(), quiet };
+        let presence = Arc::new(Presence::new("OpenXR".into()));
+        let (theirs, ended) = (decoder.clone(), end.clone());
+        let follower = Follower { user: user.into(), decoder: theirs, presence: presence.clone(), end: ended };
         let (report, loaded) = channel();
         let builder = std::thread::Builder::new().name("openxr".into());
         let thread = builder.spawn(move || follower.run(library.as_deref(), |outcome| report.send(outcome).is_ok()));
@@ -73,18 +62,21 @@ impl OpenXrClient {
         match loaded.recv_timeout(LOAD_TIMEOUT) {
             Ok(outcome) => outcome.map_err(|why| Failure::run("OpenXR", why))?,
             Err(RecvTimeoutError::Disconnected) => return Err(Failure::run("OpenXR", "the runtime cannot be loaded")),
-            Err(RecvTimeoutError::Timeout) if quiet => {}
             Err(RecvTimeoutError::Timeout) => {
-                eprintln!("OpenXR: the runtime does not answer for {} s; is awaited", LOAD_TIMEOUT.as_secs());
+                presence.note(&format!("the runtime does not answer for {} s; is awaited", LOAD_TIMEOUT.as_secs()));
             }
         }
-        Ok(OpenXrClient { decoder, heads: Mutex::new(SmoothedHeads::new(smoothing)), end, thread: Some(thread) })
+        Ok(OpenXrClient { decoder, presence, end, thread: Some(thread) })
     }
 
     /// Returns the user's input if it changed since the last call.
-    pub fn inputs(&self) -> Vec<Input> {
-        let inputs = lock(&self.decoder).inputs();
-        self.heads.lock().unwrap_or_else(PoisonError::into_inner).applied(inputs)
+    pub fn inputs(&self) -> Vec<TrackedInput> {
+        lock(&self.decoder).inputs()
+    }
+
+    /// Returns whether the headset is followed.
+    pub fn presence(&self) -> &Presence {
+        &self.presence
     }
 
     /// Returns the counts.
@@ -111,8 +103,8 @@ impl Drop for OpenXrClient {
 struct Follower {
     user: String,
     decoder: Arc<Mutex<OscDecoder>>,
+    presence: Arc<Presence>,
     end: Arc<AtomicBool>,
-    quiet: bool,
 }
 
 impl Follower {
@@ -123,39 +115,35 @@ impl Follower {
             Ok(runtime) => runtime,
             Err(why) => {
                 if !report(Err(why.clone())) {
-                    self.say(&why);
+                    self.presence.note(&why);
                 }
                 return;
             }
         };
         report(Ok(()));
-        let mut said = String::new();
         while !self.ended() {
-            let why = self.follow(&runtime, &mut said).unwrap_or_else(|why| why);
+            let followed = self.follow(&runtime);
             self.release();
-            if why != said && !self.ended() {
-                self.say(&format!("{why}; tries again"));
-                said = why;
+            if let Err(why) = followed {
+                self.presence.lost(Instant::now(), &why);
             }
             self.wait(RETRY_INTERVAL);
         }
     }
 
-    /// Follows the headset until the end or a fault, which it returns. A session that begins clears `said`, so that its
-    /// loss is said too.
-    fn follow(&self, runtime: &Runtime, said: &mut String) -> Result<String, String> {
+    /// Follows the headset until the end or a fault, which it returns.
+    fn follow(&self, runtime: &Runtime) -> Result<(), String> {
         let (mut session, mut connected) = (HeadsetSession::open(runtime)?, false);
         while !self.ended() {
             if let Some(sample) = session.sample()? {
                 if !std::mem::replace(&mut connected, true) {
-                    self.say(&session.describe());
-                    said.clear();
+                    self.presence.found(&session.describe());
                 }
                 self.apply(&sample);
             }
             std::thread::sleep(SAMPLE_INTERVAL);
         }
-        Ok(String::new())
+        Ok(())
     }
 
     /// Gives a sample to the decoder as messages of an OSC tracker. A head that is not known stays.
@@ -177,7 +165,7 @@ impl Follower {
 
     fn send(&self, part: &str, args: &[OscType]) {
         let addr = format!("/tumble/user/{}/{part}", self.user);
-        lock(&self.decoder).apply_one(&OscMessage { addr, args: args.to_vec() });
+        lock(&self.decoder).apply_one(Instant::now(), &OscMessage { addr, args: args.to_vec() });
     }
 
     fn ended(&self) -> bool {
@@ -188,12 +176,6 @@ impl Follower {
         let start = Instant::now();
         while start.elapsed() < time && !self.ended() {
             std::thread::sleep(POLL_INTERVAL);
-        }
-    }
-
-    fn say(&self, what: &str) {
-        if !self.quiet {
-            eprintln!("OpenXR: {what}");
         }
     }
 }

@@ -15,6 +15,7 @@ use super::dtrack;
 use rosc::{OscMessage, OscPacket, OscType};
 use std::collections::BTreeMap;
 use std::net::IpAddr;
+use std::time::Instant;
 use tumble::collide::{Pose, Quat, Vec3};
 use tumble::net::sync::{Input, MAX_KEYS};
 use tumble::scene::cave::{Axes, DeviceMap, Tracker};
@@ -79,6 +80,16 @@ pub struct Counts {
     pub dropped: BTreeMap<&'static str, u64>,
 }
 
+/// Input of a user, and when it was received.
+#[derive(Clone, Debug)]
+pub struct TrackedInput {
+    pub input: Input,
+    /// Receipt of the last message for the user.
+    pub received: Instant,
+    /// Receipt of the head's pose.
+    pub head_received: Option<Instant>,
+}
+
 /// State of one user's devices.
 #[derive(Clone, Debug, Default)]
 struct TrackedUser {
@@ -87,7 +98,9 @@ struct TrackedUser {
     hands: [Option<Pose>; 2],
     buttons: u32,
     keys: Vec<u16>,
-    fresh: bool,
+    /// Receipt of the last message that has not been returned yet.
+    fresh: Option<Instant>,
+    head_received: Option<Instant>,
     sequence: u64,
 }
 
@@ -141,9 +154,9 @@ impl OscDecoder {
         *count = count.wrapping_add(1);
     }
 
-    /// Decodes a datagram. One longer than [`MAX_DATAGRAM_BYTES`] may be truncated behind that
+    /// Decodes a datagram that was received at a time. One longer than [`MAX_DATAGRAM_BYTES`] may be truncated behind that
     /// length.
-    pub fn take(&mut self, from: IpAddr, bytes: &[u8]) {
+    pub fn take(&mut self, at: Instant, from: IpAddr, bytes: &[u8]) {
         self.counts.datagrams = self.counts.datagrams.wrapping_add(1);
         if !self.knows(from) {
             return self.drop(Dropped::UnknownSender);
@@ -153,7 +166,7 @@ impl OscDecoder {
         }
         if !self.dtrack_map.is_empty() {
             return match dtrack::messages(bytes, &self.dtrack_map) {
-                Ok(messages) => messages.iter().for_each(|message| self.apply_one(message)),
+                Ok(messages) => messages.iter().for_each(|message| self.apply_one(at, message)),
                 Err(why) => self.drop(why),
             };
         }
@@ -168,28 +181,30 @@ impl OscDecoder {
                 OscPacket::Message(_) if count == MAX_MESSAGES => return self.drop(Dropped::TooMany),
                 OscPacket::Message(message) => {
                     count += 1;
-                    self.apply_one(&message);
+                    self.apply_one(at, &message);
                 }
             }
         }
     }
 
-    /// Applies a message, or counts why not.
-    pub(super) fn apply_one(&mut self, message: &OscMessage) {
-        match self.apply(message) {
+    /// Applies a message that was received at a time, or counts why not.
+    pub(super) fn apply_one(&mut self, at: Instant, message: &OscMessage) {
+        match self.apply(at, message) {
             Ok(()) => self.counts.taken = self.counts.taken.wrapping_add(1),
             Err(why) => self.drop(why),
         }
     }
 
-    fn apply(&mut self, message: &OscMessage) -> Result<(), Dropped> {
+    fn apply(&mut self, at: Instant, message: &OscMessage) -> Result<(), Dropped> {
         let rest = message.addr.strip_prefix("/tumble/user/").ok_or(Dropped::UnknownAddress)?;
         let (name, what) = rest.split_once('/').ok_or(Dropped::UnknownAddress)?;
         let user = self.names.iter().position(|n| n == name).ok_or(Dropped::UnknownUser)?;
         let args = &message.args;
         let mut next = self.users[user].clone();
         match what {
-            "head" => next.head = Some(self.pose(args)?.ok_or(Dropped::Arguments)?),
+            "head" => {
+                (next.head, next.head_received) = (Some(self.pose(args)?.ok_or(Dropped::Arguments)?), Some(at));
+            }
             "wand" => next.wand = self.pose(args)?,
             "hand/left" => next.hands[0] = self.pose(args)?,
             "hand/right" => next.hands[1] = self.pose(args)?,
@@ -201,7 +216,7 @@ impl OscDecoder {
             "keys" => return Err(Dropped::Arguments),
             _ => return Err(Dropped::UnknownAddress),
         }
-        self.users[user] = TrackedUser { fresh: true, ..next };
+        self.users[user] = TrackedUser { fresh: Some(at), ..next };
         Ok(())
     }
 
@@ -225,15 +240,16 @@ impl OscDecoder {
     }
 
     /// Returns the users' input that changed since the last call.
-    pub fn inputs(&mut self) -> Vec<Input> {
+    pub fn inputs(&mut self) -> Vec<TrackedInput> {
         let mut inputs = Vec::new();
-        for (k, user) in self.users.iter_mut().enumerate().filter(|(_, user)| user.fresh) {
-            user.fresh = false;
+        for (k, user) in self.users.iter_mut().enumerate() {
+            let Some(received) = user.fresh.take() else { continue };
             user.sequence = user.sequence.wrapping_add(1);
             // without a wand the right hand takes its place
             let wand = user.wand.or(user.hands[1]);
-            let TrackedUser { head, hands, buttons, ref keys, sequence, .. } = *user;
-            inputs.push(Input { sequence, user: k as u16, head, wand, hands, buttons, keys: keys.clone() });
+            let TrackedUser { head, hands, buttons, ref keys, sequence, head_received, .. } = *user;
+            let input = Input { sequence, user: k as u16, head, wand, hands, buttons, keys: keys.clone() };
+            inputs.push(TrackedInput { input, received, head_received });
         }
         inputs
     }
@@ -283,18 +299,18 @@ mod tests {
     #[test]
     fn only_listed_senders_are_heard() {
         let mut decoder = decoder();
-        decoder.take(Ipv4Addr::new(10, 0, 0, 7).into(), &head());
+        decoder.take(Instant::now(), Ipv4Addr::new(10, 0, 0, 7).into(), &head());
         assert!(decoder.inputs().is_empty() && decoder.counts.dropped["unknown_sender"] == 1);
-        decoder.take(Ipv4Addr::LOCALHOST.into(), &head());
+        decoder.take(Instant::now(), Ipv4Addr::LOCALHOST.into(), &head());
         let inputs = decoder.inputs();
         assert_eq!(
-            (inputs.len(), inputs[0].user, inputs[0].sequence, inputs[0].head.unwrap().translation.z),
+            (inputs.len(), inputs[0].input.user, inputs[0].input.sequence, inputs[0].input.head.unwrap().translation.z),
             (1, 0, 1, 1.0)
         );
         // returned once
         assert!(decoder.inputs().is_empty());
         // as a dual-stack socket reports the same sender
-        decoder.take(Ipv4Addr::LOCALHOST.to_ipv6_mapped().into(), &head());
+        decoder.take(Instant::now(), Ipv4Addr::LOCALHOST.to_ipv6_mapped().into(), &head());
         assert!(decoder.inputs().len() == 1 && decoder.counts.dropped["unknown_sender"] == 1);
     }
 
@@ -326,12 +342,12 @@ mod tests {
                 });
                 bytes.truncate(1 + random(2 * bytes.len()));
             }
-            decoder.take(Ipv4Addr::LOCALHOST.into(), &bytes);
+            decoder.take(Instant::now(), Ipv4Addr::LOCALHOST.into(), &bytes);
         }
         assert_eq!(decoder.counts.datagrams, 1_000_000);
         assert_eq!(decoder.counts.taken + decoder.counts.dropped.values().sum::<u64>(), 1_000_000);
         assert!(decoder.counts.taken > 10_000 && decoder.counts.dropped["malformed"] > 100_000, "{:?}", decoder.counts);
-        for input in decoder.inputs() {
+        for TrackedInput { input, .. } in decoder.inputs() {
             for pose in [input.head, input.wand, input.hands[0], input.hands[1]].into_iter().flatten() {
                 assert!(pose.translation.vector.norm() <= MAX_DISTANCE_M && (pose.rotation.norm() - 1.0).abs() < 1e-12);
             }

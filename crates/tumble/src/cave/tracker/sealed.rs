@@ -30,7 +30,7 @@ pub fn listen(mut link: UdpServer, decoder: &Mutex<OscDecoder>, end: &AtomicBool
         match link.recv(POLL_INTERVAL, &mut bytes) {
             Ok(Some((relay, LinkEvent::Message))) => {
                 let from = (Ipv4Addr::LOCALHOST, relay).into();
-                take(&mut lock(decoder), &mut budgets, start.elapsed(), from, &bytes);
+                take(&mut lock(decoder), &mut budgets, start, Instant::now(), from, &bytes);
             }
             Ok(_) => {}
             Err(_) => std::thread::sleep(POLL_INTERVAL),

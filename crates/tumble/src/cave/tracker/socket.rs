@@ -2,10 +2,8 @@
 //! simulation, and the newest input is there when a frame begins.
 
 use super::budget::{SenderBudgets, WINDOW};
-use super::one_euro::Smoothing;
-use super::osc::{Counts, Dropped, MAX_DATAGRAM_BYTES, OscDecoder};
+use super::osc::{Counts, Dropped, MAX_DATAGRAM_BYTES, OscDecoder, TrackedInput};
 use super::sealed;
-use super::smoothed::SmoothedHeads;
 use crate::failure::Failure;
 use std::io::ErrorKind;
 use std::net::{IpAddr, SocketAddr, UdpSocket};
@@ -13,7 +11,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use tumble::net::sync::Input;
 use tumble::net::sync::udp::SharedKey;
 use tumble::scene::cave::{Cave, DeviceMap, Tracker};
 
@@ -27,7 +24,6 @@ pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// A tracker's socket and its thread.
 pub struct TrackerSocket {
     decoder: Arc<Mutex<OscDecoder>>,
-    heads: Mutex<SmoothedHeads>,
     end: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     at: SocketAddr,
@@ -78,11 +74,7 @@ pub fn configured(
 
 impl TrackerSocket {
     /// Opens the socket and starts the thread. `key` is that of the cave, for sealed datagrams.
-    pub fn open(
-        tracker: &Tracker,
-        key: Option<&SharedKey>,
-        smoothing: Option<Smoothing>,
-    ) -> Result<TrackerSocket, Failure> {
+    pub fn open(tracker: &Tracker, key: Option<&SharedKey>) -> Result<TrackerSocket, Failure> {
         let title = format!("the tracker's address {}", tracker.socket());
         let failed = |e: std::io::Error| Failure::run(&title, e);
         let (decoder, end) = (Arc::new(Mutex::new(OscDecoder::new(tracker))), Arc::new(AtomicBool::new(false)));
@@ -99,8 +91,7 @@ impl TrackerSocket {
             let at = socket.local_addr().map_err(failed)?;
             (builder.spawn(move || listen(&socket, &theirs, &ended)), at)
         };
-        let heads = Mutex::new(SmoothedHeads::new(smoothing));
-        Ok(TrackerSocket { decoder, heads, end, thread: Some(thread.map_err(failed)?), at })
+        Ok(TrackerSocket { decoder, end, thread: Some(thread.map_err(failed)?), at })
     }
 
     /// Returns a line for the user: address, senders, users.
@@ -115,9 +106,8 @@ impl TrackerSocket {
     }
 
     /// Returns the users' input that changed since the last call.
-    pub fn inputs(&self) -> Vec<Input> {
-        let inputs = lock(&self.decoder).inputs();
-        self.heads.lock().unwrap_or_else(PoisonError::into_inner).applied(inputs)
+    pub fn inputs(&self) -> Vec<TrackedInput> {
+        lock(&self.decoder).inputs()
     }
 
     /// Returns the counts.
@@ -157,7 +147,7 @@ fn listen(socket: &UdpSocket, decoder: &Mutex<OscDecoder>, end: &AtomicBool) {
         match socket.recv_from(&mut bytes) {
             Ok((length, from)) => {
                 count += 1;
-                take(&mut lock(decoder), &mut budgets, start.elapsed(), from, &bytes[..length]);
+                take(&mut lock(decoder), &mut budgets, start, Instant::now(), from, &bytes[..length]);
             }
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
             // such as a refused answer; this socket sends none, so any error may pass
@@ -166,14 +156,17 @@ fn listen(socket: &UdpSocket, decoder: &Mutex<OscDecoder>, end: &AtomicBool) {
     }
 }
 
-/// Takes a datagram: first its sender, then the sender's budget, then its content.
+/// Takes a datagram that was received at a time: first its sender, then the sender's budget since `start`, then its
+/// content.
 pub(super) fn take(
     decoder: &mut OscDecoder,
     budgets: &mut SenderBudgets,
-    now: Duration,
+    start: Instant,
+    at: Instant,
     from: SocketAddr,
     bytes: &[u8],
 ) {
+    let now = at.saturating_duration_since(start);
     if !decoder.knows(from.ip()) {
         return decoder.skip(Dropped::UnknownSender);
     }
@@ -181,7 +174,7 @@ pub(super) fn take(
         return decoder.skip(Dropped::TooMany);
     }
     let before = decoder.counts.taken;
-    decoder.take(from.ip(), bytes);
+    decoder.take(at, from.ip(), bytes);
     if decoder.counts.taken != before {
         budgets.applied(now, from);
     }
@@ -210,12 +203,12 @@ mod tests {
         ];
         for (senders, genuine, stranger, why) in cases {
             let (mut decoder, mut budgets) = (OscDecoder::new(&tracker(senders)), SenderBudgets::default());
-            let pose = pose();
+            let (pose, start) = (pose(), Instant::now());
             for k in 0..160_000u64 {
-                let now = Duration::from_micros(50 * k);
-                take(&mut decoder, &mut budgets, now, stranger, b"garbage");
+                let at = start + Duration::from_micros(50 * k);
+                take(&mut decoder, &mut budgets, start, at, stranger, b"garbage");
                 if k % 333 == 0 {
-                    take(&mut decoder, &mut budgets, now, genuine, &pose);
+                    take(&mut decoder, &mut budgets, start, at, genuine, &pose);
                 }
             }
             assert_eq!(decoder.counts.taken, 481, "{:?}", decoder.counts);

@@ -3,9 +3,8 @@
 //!
 //! The client connects by TCP, and again a second after a connection was lost. It writes nothing but its greeting.
 
-use super::one_euro::Smoothing;
-use super::osc::{Counts, OscDecoder};
-use super::smoothed::SmoothedHeads;
+use super::osc::{Counts, OscDecoder, TrackedInput};
+use super::presence::Presence;
 use super::socket::{POLL_INTERVAL, lock};
 use crate::failure::Failure;
 use rosc::{OscMessage, OscType};
@@ -15,7 +14,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use tumble::net::sync::Input;
 use tumble::net::vrpn::{GREETING, Report, VrpnStream};
 use tumble::scene::cave::{DeviceMap, Tracker};
 
@@ -29,7 +27,7 @@ const MAX_BUTTONS: i32 = 32;
 /// A connection to a server and its thread.
 pub struct VrpnClient {
     decoder: Arc<Mutex<OscDecoder>>,
-    heads: Mutex<SmoothedHeads>,
+    presence: Arc<Presence>,
     end: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -39,13 +37,7 @@ impl VrpnClient {
     ///
     /// # Errors
     /// An address that has no meaning, and maps of users that the tracker does not have.
-    pub fn open(
-        server: &str,
-        maps: &[DeviceMap],
-        tracker: &Tracker,
-        smoothing: Option<Smoothing>,
-        quiet: bool,
-    ) -> Result<VrpnClient, Failure> {
+    pub fn open(server: &str, maps: &[DeviceMap], tracker: &Tracker) -> Result<VrpnClient, Failure> {
         if maps.is_empty() {
             return Err(Failure::input("--vrpn: no device moves a user; name them with --vrpn-map DEVICE=USER/PART"));
         }
@@ -58,16 +50,22 @@ impl VrpnClient {
         let address = server.to_socket_addrs().map_err(|e| unknown(e.to_string()))?.next();
         let address = address.ok_or_else(|| unknown("has no address".into()))?;
         let (decoder, end) = (Arc::new(Mutex::new(OscDecoder::new(tracker))), Arc::new(AtomicBool::new(false)));
-        let session = Session { address, maps: maps.to_vec(), decoder: decoder.clone(), end: end.clone(), quiet };
+        let presence = Arc::new(Presence::new(format!("VRPN {address}")));
+        let (maps, ended) = (maps.to_vec(), end.clone());
+        let session = Session { address, maps, decoder: decoder.clone(), presence: presence.clone(), end: ended };
         let builder = std::thread::Builder::new().name("vrpn".into());
         let thread = builder.spawn(move || session.run()).map_err(|e| Failure::run("the VRPN client", e))?;
-        Ok(VrpnClient { decoder, heads: Mutex::new(SmoothedHeads::new(smoothing)), end, thread: Some(thread) })
+        Ok(VrpnClient { decoder, presence, end, thread: Some(thread) })
     }
 
     /// Returns the users' input that changed since the last call.
-    pub fn inputs(&self) -> Vec<Input> {
-        let inputs = lock(&self.decoder).inputs();
-        self.heads.lock().unwrap_or_else(std::sync::PoisonError::into_inner).applied(inputs)
+    pub fn inputs(&self) -> Vec<TrackedInput> {
+        lock(&self.decoder).inputs()
+    }
+
+    /// Returns whether the server answers.
+    pub fn presence(&self) -> &Presence {
+        &self.presence
     }
 
     /// Returns the counts.
@@ -90,18 +88,15 @@ struct Session {
     address: SocketAddr,
     maps: Vec<DeviceMap>,
     decoder: Arc<Mutex<OscDecoder>>,
+    presence: Arc<Presence>,
     end: Arc<AtomicBool>,
-    quiet: bool,
 }
 
 impl Session {
     fn run(&self) {
-        let mut said = String::new();
         while !self.ended() {
-            let why = self.connect().unwrap_or_else(|why| why);
-            if why != said && !self.ended() && !self.quiet {
-                eprintln!("VRPN {}: {why}; tries again", self.address);
-                said = why;
+            if let Err(why) = self.connect() {
+                self.presence.lost(Instant::now(), &why);
             }
             let wait = Instant::now();
             while wait.elapsed() < RETRY_INTERVAL && !self.ended() {
@@ -115,7 +110,7 @@ impl Session {
     }
 
     /// Reads until the end or a fault, which it returns.
-    fn connect(&self) -> Result<String, String> {
+    fn connect(&self) -> Result<(), String> {
         let failed = |e: std::io::Error| e.to_string();
         let mut socket = TcpStream::connect_timeout(&self.address, GREETING_TIMEOUT).map_err(failed)?;
         socket.set_read_timeout(Some(POLL_INTERVAL)).map_err(failed)?;
@@ -127,10 +122,9 @@ impl Session {
             match socket.read(&mut bytes) {
                 Ok(0) => return Err("the server closed the connection".into()),
                 Ok(length) => {
-                    if !heard && !self.quiet {
-                        eprintln!("VRPN {}: is connected", self.address);
+                    if !std::mem::replace(&mut heard, true) {
+                        self.presence.found("is connected");
                     }
-                    heard = true;
                     stream.take(&bytes[..length], |report| self.apply(&report, &mut buttons))?;
                 }
                 Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
@@ -141,7 +135,7 @@ impl Session {
                 Err(e) => return Err(e.to_string()),
             }
         }
-        Ok(String::new())
+        Ok(())
     }
 
     /// Gives a report to the decoder as the message of an OSC tracker.
@@ -161,8 +155,8 @@ impl Session {
                 }
                 _ => continue,
             };
-            lock(&self.decoder)
-                .apply_one(&OscMessage { addr: format!("/tumble/user/{}/{}", map.user, map.part), args });
+            let addr = format!("/tumble/user/{}/{}", map.user, map.part);
+            lock(&self.decoder).apply_one(Instant::now(), &OscMessage { addr, args });
         }
     }
 }
@@ -171,6 +165,7 @@ impl Session {
 mod tests {
     use super::*;
     use std::net::TcpListener;
+    use tumble::net::sync::Input;
 
     /// A message by the description of the protocol.
     fn message(sender: i32, kind: i32, contents: &[u8]) -> Vec<u8> {
@@ -199,7 +194,7 @@ mod tests {
     fn awaited(client: &VrpnClient, wanted: impl Fn(&Input) -> bool) -> Input {
         let start = Instant::now();
         loop {
-            if let Some(input) = client.inputs().into_iter().find(|input| wanted(input)) {
+            if let Some(input) = client.inputs().into_iter().map(|tracked| tracked.input).find(&wanted) {
                 return input;
             }
             assert!(start.elapsed() < Duration::from_secs(10), "no such input");
@@ -215,7 +210,7 @@ mod tests {
         let at = listener.local_addr().unwrap().to_string();
         let maps = ["Glasses:1=viewer/head", "Wand=viewer/hand/right", "Wand=viewer/buttons"];
         let maps: Vec<DeviceMap> = maps.iter().map(|map| map.parse().unwrap()).collect();
-        let client = VrpnClient::open(&at, &maps, &tracker(), None, true).unwrap_or_else(|e| panic!("{}", e.report()));
+        let client = VrpnClient::open(&at, &maps, &tracker()).unwrap_or_else(|e| panic!("{}", e.report()));
         for (round, x) in [(0, 0.25), (1, 0.75)] {
             let (mut socket, _) = listener.accept().unwrap();
             let mut greeting = [0; 24];
@@ -245,6 +240,16 @@ mod tests {
             assert_eq!((input.hands[1].unwrap().translation.x, input.buttons), (-x, 4));
         }
         assert_eq!(client.counts().dropped["invalid_rotation"], 2);
+        // each loss of the connection is reported, also for the same reason, and is an alarm
+        let (start, about) = (Instant::now(), client.presence());
+        while about.alarm().is_none() {
+            assert!(start.elapsed() < Duration::from_secs(10), "the loss is no alarm");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let closed = "the server closed the connection";
+        assert_eq!(about.alarm().unwrap(), format!("VRPN {at}: {closed}"));
+        let (lost, found) = (format!("VRPN {at}: {closed}; tries again"), format!("VRPN {at}: is connected"));
+        assert_eq!(about.lines(), [found.clone(), lost.clone(), found, lost]);
     }
 
     #[test]
@@ -259,7 +264,7 @@ mod tests {
             assert!(wrong.parse::<DeviceMap>().unwrap_err().starts_with("expected DEVICE"), "{wrong}");
         }
         let stray = ["G=other/head".parse().unwrap()];
-        let said = VrpnClient::open("127.0.0.1:1", &stray, &tracker(), None, true).err().unwrap();
+        let said = VrpnClient::open("127.0.0.1:1", &stray, &tracker()).err().unwrap();
         assert!(said.report().contains("there is no user \"other\"; there are viewer"), "{}", said.report());
     }
 }
