@@ -91,7 +91,7 @@ fn damped_springs_of_any_stiffness_lose_energy() {
     }
 }
 
-/// What holds a joint is constant in a sub-step of `backtracking`, so springs beside it are rows, whatever the integrator.
+/// The force of a joint is constant in a sub-step of `backtracking`, so springs beside it are rows, whatever the integrator.
 #[test]
 fn springs_keep_their_energy_with_every_integrator() {
     for integrator in [Integrator::Verlet, Integrator::Rk4, Integrator::DormandPrince] {
