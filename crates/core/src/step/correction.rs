@@ -103,6 +103,11 @@ pub(super) fn is_joint(t: &RowTarget) -> bool {
     t.set == RowSet::Equality && t.compliance == 0.0
 }
 
+/// Returns whether there are joints or stiff springs, whose ends of a step are corrected.
+pub(super) fn holds(work: &Workspace) -> bool {
+    work.targets.iter().any(is_joint) || springs::any_stiff(work)
+}
+
 /// Corrects the present numbers at the end of a step (or in place). `work` has the rows of the
 /// step, which respond at the moment `acting`, or else at the start of the step.
 pub(super) fn correct(
@@ -113,8 +118,7 @@ pub(super) fn correct(
     options: &Options,
 ) -> Result<(), StepError> {
     let time = core.state.time + options.h;
-    let joints = !matches!(options.contacts, Contacts::InPlace)
-        && (work.targets.iter().any(is_joint) || springs::any_stiff(work));
+    let joints = !matches!(options.contacts, Contacts::InPlace) && holds(work);
     let mut gaps = measure_gaps(core, work, options, time)?;
     if overlap::separate(core, acting.as_deref_mut(), work, &gaps, options) && !gaps.is_empty() {
         gaps = measure_gaps(core, work, options, time)?;

@@ -81,7 +81,7 @@ impl Backtracking {
     /// Corrects joints, and limits that had a force, at the end of a sub-step of `h` seconds;
     /// `left` is the time until the end of the frame.
     fn correct(&mut self, core: &mut Core, start: &[f64], (h, left): (f64, f64)) -> Result<(), StepError> {
-        let joined = self.work.targets.iter().any(correction::is_joint);
+        let joined = correction::holds(&self.work);
         let (mut before, mut after, struck) = (Vec::new(), Vec::new(), vec![false; core.dof]);
         if joined {
             let end = core.state.x.to_vec();

@@ -155,7 +155,7 @@ impl Backtracking {
         let mut u = Vec::new();
         whiten(core.coordinates(None), &dp, 1.0, &mut u, &mut work.du_force);
         work.dp = dp;
-        if work.targets.iter().any(correction::is_joint) {
+        if correction::holds(work) {
             self.forces.clone_from(&work.du_force);
             let free = free_motion_change(core.coordinates(None), 1.0);
             self.forces.iter_mut().zip(&free).for_each(|(force, free)| *force -= free);
