@@ -6,11 +6,11 @@ use tumble_core::collide::{Pose, Vec3};
 
 use super::defaults::Item;
 use super::names::find;
-use super::scene::{Assembly, Place};
+use super::scene::Assembly;
 use super::schema;
 use super::source::XmlNode;
 use crate::parse::joint::MimicSpec;
-use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
+use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec};
 use crate::parse::mimic::{JointMimicSpec, JointSideSpec};
 use crate::xml::Element;
 
@@ -53,17 +53,16 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
         let Some([frame_a, frame_b]) = frames(item, assembly.poses[a].inverse() * assembly.poses[b]) else { return };
         [(a, frame_a), (b, frame_b)]
     };
-    let ends = ends.map(|(body, frame)| match assembly.places[body] {
-        Place::World => (None, assembly.poses[body] * frame),
-        Place::Rigid(index) => (Some(PartSpec::Body(index)), frame),
-        Place::Link(tree, link) => (Some(PartSpec::Link(tree, link)), frame),
-    });
+    if ends.iter().all(|(body, _)| assembly.is_held(*body)) {
+        let why = "equality constraints between bodies that are fixed or mocap are left out";
+        return assembly.reader.notes.add(element, why);
+    }
+    let ends = ends.map(|(body, frame)| assembly.placed(body, &frame));
     let ((a, frame_a), (b, frame_b)) = match ends {
         [(Some(a), frame_a), b] if Some(a) != b.0 => ((a, frame_a), b),
         [fixed @ (None, _), (Some(b), frame_b)] => ((b, frame_b), fixed),
         _ => {
-            let why = "equality constraints within one body, or between fixed bodies, are left out";
-            return assembly.reader.notes.add(element, why);
+            return assembly.reader.notes.add(element, "equality constraints within one body are left out");
         }
     };
     let number = assembly.scene.loop_joints.len();

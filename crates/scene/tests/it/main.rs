@@ -34,6 +34,7 @@ mod mjcf_constraints;
 mod mjcf_contacts;
 mod mjcf_damaged;
 mod mjcf_written;
+mod mjcf_mocap;
 mod mjcf_written_names;
 mod mujoco;
 mod names;
