@@ -190,11 +190,11 @@ impl<'a> Item<'a> {
     }
 
     /// Returns whether a range applies: as the flag `name` says, and with `auto` if the range is
-    /// present.
+    /// present and its two numbers differ.
     pub(super) fn limited(&self, name: &str, range: &str, autolimits: bool) -> bool {
         match self.word(name, LIMITED).unwrap_or(None) {
             Some(limited) => limited,
-            None => autolimits && self.text(range).is_some(),
+            None => autolimits && self.text(range).is_some_and(|text| !is_empty_range(text)),
         }
     }
 
@@ -211,3 +211,9 @@ pub(super) fn cleaned(name: &str) -> String {
 
 pub(super) const FLAGS: &[(&str, bool)] = &[("true", true), ("false", false)];
 const LIMITED: &[(&str, Option<bool>)] = &[("true", Some(true)), ("false", Some(false)), ("auto", None)];
+/// Returns whether a text is two equal numbers.
+fn is_empty_range(text: &str) -> bool {
+    let numbers: Vec<Option<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    matches!(numbers[..], [Some(low), Some(high)] if low == high)
+}
+

@@ -78,7 +78,8 @@ impl<'a> JointItem<'a> {
         let number = |name: &str| item.number(name, Bound::NOT_NEGATIVE, 0.0);
         let single = kind != Kind::Ball;
         let limited = item.limited("limited", "range", reader.compiler.autolimits);
-        if !limited && item.text("range").is_some() && item.text("limited").is_none() {
+        let is_dropped = !limited && !reader.compiler.autolimits;
+        if is_dropped && item.text("range").is_some() && item.text("limited").is_none() {
             reader.notes.add(&element, "a range without `limited` has no effect, since `autolimits` is false");
         }
         let limits = match limited && single && reader.limits {

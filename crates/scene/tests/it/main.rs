@@ -30,6 +30,7 @@ mod finding;
 mod loop_dofs;
 mod mimics;
 mod mjcf;
+mod mjcf_actuators;
 mod mjcf_constraints;
 mod mjcf_contacts;
 mod mjcf_damaged;
