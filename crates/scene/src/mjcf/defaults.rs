@@ -101,6 +101,17 @@ impl<'a> Classes<'a> {
         found
     }
 
+    /// Returns the parent of each class, and its defaults of actuators. A class comes after its parent.
+    pub(super) fn actuators(&self) -> impl Iterator<Item = (Option<usize>, impl Iterator<Item = &Element<'a, 'a>>)> {
+        let is_actuator = |element: &&Element<'_, '_>| ACTUATORS.contains(&element.tag());
+        self.all.iter().map(move |class| (class.parent, class.elements.iter().filter(is_actuator)))
+    }
+
+    /// Returns the class that an element names, or class 0.
+    pub(super) fn class_of(&self, element: &Element<'_, '_>) -> usize {
+        element.text("class").and_then(|name| self.names.get(name)).copied().unwrap_or(0)
+    }
+
     /// Returns an element with its defaults: those of its class, else of `around`.
     pub(super) fn item(&self, element: Element<'a, 'a>, around: usize) -> Item<'a> {
         let tag = element.tag();

@@ -36,6 +36,7 @@ mod compiler;
 mod defaults;
 mod equality;
 mod error;
+mod gains;
 mod geom;
 mod inertia;
 mod joint;
