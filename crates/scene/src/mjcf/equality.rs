@@ -98,6 +98,7 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
 
 /// Returns the frames of a joint in both bodies. `reference` is the pose of the second in the first in the reference
 /// configuration. The `anchor` of a `<connect>` is a point of the first body, that of a `<weld>` a point of the second.
+/// The position of `relpose` is a point of the first body: that of the weld.
 fn frames(item: &Item<'_>, reference: Pose) -> Option<[Pose; 2]> {
     let anchor: Option<[f64; 3]> = item.numbers("anchor");
     let at = |p: [f64; 3]| Pose::translation(p[0], p[1], p[2]);
@@ -114,9 +115,8 @@ fn frames(item: &Item<'_>, reference: Pose) -> Option<[Pose; 2]> {
         let turn = Unit::try_new(Quaternion::new(p[3], p[4], p[5], p[6]), 1e-10)?;
         Some(Pose::from_parts(Vec3::new(p[0], p[1], p[2]).into(), turn))
     });
-    let relative = relative.unwrap_or(reference);
     let frame = at(anchor.unwrap_or_default());
-    Some([relative * frame, frame])
+    Some([relative.unwrap_or(reference * frame), frame])
 }
 
 /// Couples a joint to another, `q₁ − ref₁ = a₀ + a₁(q₂ − ref₂)`, or holds it.
