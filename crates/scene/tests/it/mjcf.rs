@@ -400,3 +400,24 @@ fn a_quadruped_on_feet_of_all_laws_of_friction_steps() {
     }
     assert!(unconverged <= 30, "{unconverged} of 1000 steps");
 }
+
+/// MuJoCo 4.0 compiles this body to 4.1887902 kg and 0.01675516 kg·m², and refuses the inertia where it has no geom.
+#[test]
+fn an_inertia_that_geoms_replace_is_not_checked() {
+    let body = |geom: &str, how: &str| {
+        format!(
+            r#"<mujoco><compiler inertiafromgeom="{how}"/><worldbody><body name="b"><joint/>
+            <inertial pos="0 0 0" mass="1" diaginertia="1 1 9"/>{geom}</body></worldbody></mujoco>"#
+        )
+    };
+    let ball = r#"<geom size=".1"/>"#;
+    let scene = read(&body(ball, "true")).unwrap();
+    let LinkMassSpec::Given(mass) = scene.articulated[0].links[0].mass else { panic!() };
+    assert!((mass.mass - 4.1887902).abs() < 1e-7 && (mass.inertia[(0, 0)] - 0.01675516).abs() < 1e-8);
+    assert!(errors(&body("", "true"))[0].contains("has an inertia that no body has"));
+    assert!(errors(&body(ball, "auto"))[0].contains("diaginertia"));
+    // without a geom the numbers of <inertial> count, as in MuJoCo
+    let scene = read(&body("", "true").replace("1 1 9", "1 1 1")).unwrap();
+    let LinkMassSpec::Given(mass) = scene.articulated[0].links[0].mass else { panic!() };
+    assert_eq!((mass.mass, mass.inertia[(0, 0)]), (1.0, 1.0));
+}
