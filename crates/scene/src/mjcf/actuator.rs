@@ -253,7 +253,8 @@ fn control_range(item: &Item<'_>, inherited: f64, arms: &[Arm], assembly: &Assem
 
 /// Adds the armature and the damping of an actuator to its joint.
 fn add_rotor(item: &Item<'_>, spec: &ActuatorSpec, assembly: &mut Assembly<'_, '_>) {
-    let own = ["armature", "damping"].map(|name| item.number(name, Bound::NOT_NEGATIVE, 0.0));
+    let damping = item.first_coefficient("damping", &assembly.reader.notes);
+    let own = [item.number("armature", Bound::NOT_NEGATIVE, 0.0), damping];
     if own == [0.0; 2] {
         return;
     }

@@ -180,6 +180,22 @@ impl<'a> Item<'a> {
         self.at(name).and_then(|element| element.number(name, bound)).unwrap_or(default)
     }
 
+    /// Returns the first coefficient of a polynomial, a number of at least 0; 0 if it is absent or wrong. The others are
+    /// left out with a note.
+    pub(super) fn first_coefficient(&self, name: &str, notes: &Ledger) -> f64 {
+        let Some(element) = self.at(name) else { return 0.0 };
+        let coefficients = element.list(name, 3, Bound::ANY).unwrap_or_default();
+        let Some((first, others)) = coefficients.split_first() else { return 0.0 };
+        if others.iter().any(|x| *x != 0.0) {
+            let why = "the second and third numbers of `stiffness` and `damping` are left out: forces are linear here";
+            notes.add(element, why);
+        }
+        if *first < 0.0 {
+            element.wrong(name, format_args!("{} as the first number", Bound::NOT_NEGATIVE.expected()));
+        }
+        first.max(0.0)
+    }
+
     /// Returns `N` numbers, if present; NaN if they are wrong.
     pub(super) fn numbers<const N: usize>(&self, name: &str) -> Option<[f64; N]> {
         self.at(name)?.numbers(name, Bound::ANY)
@@ -215,6 +231,12 @@ impl<'a> Item<'a> {
     }
 }
 
+/// Returns whether a text is two equal numbers.
+fn is_empty_range(text: &str) -> bool {
+    let numbers: Vec<Option<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    matches!(numbers[..], [Some(low), Some(high)] if low == high)
+}
+
 /// Returns a name without control characters.
 pub(super) fn cleaned(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
@@ -222,9 +244,3 @@ pub(super) fn cleaned(name: &str) -> String {
 
 pub(super) const FLAGS: &[(&str, bool)] = &[("true", true), ("false", false)];
 const LIMITED: &[(&str, Option<bool>)] = &[("true", Some(true)), ("false", Some(false)), ("auto", None)];
-/// Returns whether a text is two equal numbers.
-fn is_empty_range(text: &str) -> bool {
-    let numbers: Vec<Option<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
-    matches!(numbers[..], [Some(low), Some(high)] if low == high)
-}
-

@@ -421,3 +421,24 @@ fn an_inertia_that_geoms_replace_is_not_checked() {
     let LinkMassSpec::Given(mass) = scene.articulated[0].links[0].mass else { panic!() };
     assert_eq!((mass.mass, mass.inertia[(0, 0)]), (1.0, 1.0));
 }
+
+/// MuJoCo 4.0 compiles the first number to `jnt_stiffness` and `dof_damping`, the others to `jnt_stiffnesspoly` and
+/// `dof_dampingpoly`.
+#[test]
+fn polynomials_of_stiffness_and_damping_are_noted() {
+    let scene = worldbody(
+        r#"<body name="b"><joint stiffness="1 2 3" damping=".1 .2"/><geom size="0.1" pos=".3 0 0"/></body>
+           <body name="c"><joint stiffness="4 0 0" damping=".5"/><geom size="0.1" pos=".3 0 0"/></body>"#,
+    );
+    let dof = |tree: usize| &scene.articulated[tree].links[0].joint.dof;
+    assert_eq!((dof(0).spring.unwrap().stiffness, dof(0).damping), (1.0, 0.1));
+    assert_eq!((dof(1).spring.unwrap().stiffness, dof(1).damping), (4.0, 0.5));
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+    let note = scene.notes.iter().next().unwrap();
+    assert!(note.contains("`stiffness` and `damping`"), "{note}");
+    let wrong = |joint: &str| {
+        format!(r#"<mujoco><worldbody><body><joint {joint}/><geom size=".1"/></body></worldbody></mujoco>"#)
+    };
+    assert!(errors(&wrong(r#"stiffness="-1 2""#))[0].contains("at least 0 as the first number"));
+    assert!(errors(&wrong(r#"damping="1 2 3 4""#))[0].contains("1 to 3 numbers"));
+}
