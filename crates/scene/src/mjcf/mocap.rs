@@ -13,7 +13,7 @@ use crate::parse::link::Surface;
 use crate::parse::mount::Mounts;
 use crate::parse::shape::{CompoundPartSpec, PartFilter, PartSurface, ShapeSpec};
 
-/// Radius of the shape of a body without geoms, m. It neither collides nor is drawn.
+/// Radius of the shape of a body without geoms, m. The shape does not collide and is not drawn.
 const EMPTY_RADIUS: f64 = 0.005;
 
 impl Assembly<'_, '_> {
