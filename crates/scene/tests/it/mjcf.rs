@@ -434,7 +434,7 @@ fn polynomials_of_stiffness_and_damping_are_noted() {
     assert_eq!((dof(0).spring.unwrap().stiffness, dof(0).damping), (1.0, 0.1));
     assert_eq!((dof(1).spring.unwrap().stiffness, dof(1).damping), (4.0, 0.5));
     assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
-    let note = scene.notes.iter().next().unwrap();
+    let note = &scene.notes[0];
     assert!(note.contains("`stiffness` and `damping`"), "{note}");
     let wrong = |joint: &str| {
         format!(r#"<mujoco><worldbody><body><joint {joint}/><geom size=".1"/></body></worldbody></mujoco>"#)
