@@ -147,6 +147,31 @@ fn a_thrower_places_what_it_spawns_and_adds_its_velocity() {
     assert!((velocity(&world, shot) - (3.0 * out + v + spin.cross(&out))).norm() < 1e-6);
 }
 
+/// A shot at rest relative to a spinning turret moves as a point of it: `ω` of the turret, and `v + ω × r` at its own center of
+/// mass, which is beside its origin.
+#[test]
+fn what_is_spawned_at_rest_moves_with_its_thrower() {
+    let mut world = no_gravity(world("time_stepping", 0.01));
+    let (spin, v) = (Vec3::new(0.0, 0.0, 2.0), Vec3::new(0.5, 0.0, 0.0));
+    let turret = world.add(ball("turret", [1.0, 0.0, 0.0]).with_angular_velocity(spin).with_velocity(v)).unwrap();
+    let shape = ball("", [0.0; 3]).with_center_of_mass(Vec3::new(0.0, 0.3, 0.0));
+    let template = Template::add(&mut world, "shot", &shape, 1, false).unwrap();
+    let action = Action::Spawn {
+        template,
+        pose: Pose::translation(1.0, 0.0, 0.0),
+        velocity: Vec3::zeros(),
+        angular_velocity: Vec3::new(0.0, 0.0, 0.5),
+        from: Some(turret),
+    };
+    world.add(at(0.2).with_action(action)).unwrap();
+    run_to(&mut world, 0.2);
+    let shot = world.center_state(world.find("shot 1").unwrap()).unwrap();
+    let (sin, cos) = 0.4f64.sin_cos();
+    let center = Vec3::new(cos - 0.3 * sin, sin + 0.3 * cos, 0.0);
+    assert!((shot.velocity - (v + spin.cross(&center))).norm() < 1e-6, "{}", shot.velocity);
+    assert!((shot.angular_velocity - Vec3::new(0.0, 0.0, 2.5)).norm() < 1e-9, "{}", shot.angular_velocity);
+}
+
 #[test]
 fn a_contact_fires_from_its_threshold_on() {
     let impulse = 2.0 * 1.5 * (2.0 * G).sqrt(); // m·(1 + e)·v after 1 m

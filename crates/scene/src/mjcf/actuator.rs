@@ -22,8 +22,10 @@ use tumble_core::articulated::Drive;
 
 use super::defaults::{Item, cleaned};
 use super::equality::single;
+use super::gains::{DefaultGains, Form, Gains};
 use super::inertia::Inertias;
 use super::joint::read_range;
+use super::notes::Ledger;
 use super::scene::Assembly;
 use super::schema;
 use super::source::XmlNode;
@@ -81,13 +83,14 @@ type Arm = (super::equality::Single, f64);
 pub(super) fn read<'a>(root: &XmlNode<'a>, controls: Option<&[f64]>, assembly: &mut Assembly<'_, 'a>) {
     let reader = assembly.reader;
     let tendons = read_tendons(root, assembly);
+    let defaults = DefaultGains::of(&reader.classes);
     let mut inertias = Inertias::default();
     let mut drives: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     let mut elements = Vec::new();
     for (number, node) in root.all("actuator").flat_map(|section| &section.children).enumerate() {
         let element = node.element;
         let item = reader.classes.item(element, 0);
-        let Some(mut spec) = read_one(&item, &tendons, &mut inertias, assembly) else { continue };
+        let Some(mut spec) = read_one(&item, &tendons, &defaults, &mut inertias, assembly) else { continue };
         let start = controls.and_then(|controls| controls.get(number)).copied().unwrap_or(0.0);
         spec.control = spec.control_range.map_or(start, |[low, high]| start.max(low).min(high));
         let index = assembly.scene.actuators.len();
@@ -142,11 +145,12 @@ fn read_tendons(root: &XmlNode<'_>, assembly: &Assembly<'_, '_>) -> BTreeMap<Str
     tendons
 }
 
-fn read_one(
-    item: &Item<'_>,
+fn read_one<'a>(
+    item: &Item<'a>,
     tendons: &BTreeMap<String, Vec<Arm>>,
+    defaults: &DefaultGains<'a>,
     inertias: &mut Inertias,
-    assembly: &mut Assembly<'_, '_>,
+    assembly: &mut Assembly<'_, 'a>,
 ) -> Option<ActuatorSpec> {
     let (element, reader) = (item.own(), assembly.reader);
     let notes = &reader.notes;
@@ -183,7 +187,8 @@ fn read_one(
         notes.add(element, "actuators of tendons across articulated bodies are left out");
         return None;
     }
-    let law = read_law(item, assembly)?;
+    let gains = defaults.read(element, reader.classes.class_of(element));
+    let law = law_of(&gains, element, notes)?;
     let gear = item.list("gear", 6).map_or(1.0, |gear| gear[0]);
     let moments: Vec<(usize, f64)> = arms.iter().map(|(joint, coefficient)| (joint.link, gear * coefficient)).collect();
     let mut spec = ActuatorSpec {
@@ -192,7 +197,7 @@ fn read_one(
         moments,
         gain: law.gain,
         bias: law.bias,
-        control_range: control_range(item, &arms, assembly),
+        control_range: control_range(item, gains.inherited_range, &arms, assembly),
         force_range: ranged(item, "forcelimited", "forcerange", assembly),
         control: 0.0,
         driven: false,
@@ -204,51 +209,29 @@ fn read_one(
     Some(spec)
 }
 
-/// Reads gain and bias. `None` if the force is not affine.
-fn read_law(item: &Item<'_>, assembly: &Assembly<'_, '_>) -> Option<Law> {
-    let notes = &assembly.reader.notes;
-    let element = item.own();
-    let number = |name: &str, default: f64| item.number(name, Bound::NOT_NEGATIVE, default);
-    match element.tag() {
-        "motor" => return Some(Law { gain: 1.0, bias: [0.0; 3], damping_ratio: None }),
-        "position" => {
-            if item.at("timeconst").is_some() {
-                schema::ACTUATOR.check(item.at("timeconst")?, notes);
-            }
-            let (kp, kv) = (number("kp", 1.0), number("kv", 0.0));
-            let damping_ratio = Some(number("dampratio", 0.0)).filter(|ratio| *ratio > 0.0);
-            return Some(Law { gain: kp, bias: [0.0, -kp, -kv], damping_ratio });
-        }
-        "velocity" => {
-            let kv = number("kv", 1.0);
-            return Some(Law { gain: kv, bias: [0.0, 0.0, -kv], damping_ratio: None });
-        }
-        _ => {}
+/// Returns the law of an actuator. `None` if the force is not affine.
+fn law_of(gains: &Gains<'_>, element: &Element<'_, '_>, notes: &Ledger) -> Option<Law> {
+    if gains.delayed {
+        notes.add(element, schema::ACTIVATION);
     }
-    if item.text("dyntype").is_some_and(|dyntype| dyntype != "none") {
-        notes.add(
-            item.at("dyntype")?,
-            "delays and activations of actuators are left out: their forces follow the control at once",
-        );
-    }
-    let gain = item.list("gainprm", 10).unwrap_or_else(|| vec![1.0]);
-    let bias = item.list("biasprm", 10).unwrap_or_default();
-    let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(0.0);
-    let fixed = match item.text("gaintype").unwrap_or("fixed") {
-        "fixed" => true,
-        "affine" => at(&gain, 1) == 0.0 && at(&gain, 2) == 0.0,
-        _ => false,
+    let [gain, per_length, per_rate] = gains.gain;
+    let is_constant = match gains.gain_form {
+        Form::Constant => true,
+        Form::Affine => per_length == 0.0 && per_rate == 0.0,
+        Form::Other => false,
     };
-    let bias = match item.text("biastype").unwrap_or("none") {
-        "none" => Some([0.0; 3]),
-        "affine" => Some([at(&bias, 0), at(&bias, 1), at(&bias, 2)]),
-        _ => None,
+    let bias = match gains.bias_form {
+        Form::Constant => Some([0.0; 3]),
+        Form::Affine => Some(gains.bias),
+        Form::Other => None,
     };
-    let (true, Some(bias)) = (fixed, bias) else {
+    let (true, Some(mut bias)) = (is_constant, bias) else {
         notes.add(element, "actuators whose force is not affine (muscles and the like) are left out");
         return None;
     };
-    Some(Law { gain: gain[0], bias, damping_ratio: None })
+    let is_ratio = gains.gain_form == Form::Constant && bias[2] > 0.0 && bias[1] == -gain;
+    let damping_ratio = is_ratio.then(|| std::mem::take(&mut bias[2]));
+    Some(Law { gain, bias, damping_ratio })
 }
 
 fn ranged(item: &Item<'_>, limited: &str, range: &str, assembly: &Assembly<'_, '_>) -> Option<[f64; 2]> {
@@ -256,9 +239,8 @@ fn ranged(item: &Item<'_>, limited: &str, range: &str, assembly: &Assembly<'_, '
     applies.then(|| read_range(item, range)).flatten()
 }
 
-/// Returns the range of controls: its own, or that of its joint by `inheritrange`.
-fn control_range(item: &Item<'_>, arms: &[Arm], assembly: &Assembly<'_, '_>) -> Option<[f64; 2]> {
-    let inherited = item.number("inheritrange", Bound::NOT_NEGATIVE, 0.0);
+/// Returns the range of controls: its own, or this fraction of that of its joint.
+fn control_range(item: &Item<'_>, inherited: f64, arms: &[Arm], assembly: &Assembly<'_, '_>) -> Option<[f64; 2]> {
     if inherited > 0.0
         && let [(joint, _)] = arms
         && let Some([low, high]) = assembly.scene.articulated[joint.tree].links[joint.link].joint.dof.limits
@@ -271,7 +253,8 @@ fn control_range(item: &Item<'_>, arms: &[Arm], assembly: &Assembly<'_, '_>) -> 
 
 /// Adds the armature and the damping of an actuator to its joint.
 fn add_rotor(item: &Item<'_>, spec: &ActuatorSpec, assembly: &mut Assembly<'_, '_>) {
-    let own = ["armature", "damping"].map(|name| item.number(name, Bound::NOT_NEGATIVE, 0.0));
+    let damping = item.first_coefficient("damping", &assembly.reader.notes);
+    let own = [item.number("armature", Bound::NOT_NEGATIVE, 0.0), damping];
     if own == [0.0; 2] {
         return;
     }

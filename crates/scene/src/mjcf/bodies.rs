@@ -1,4 +1,4 @@
-//! Bodies of a model as bodies of a scene: static ones, rigid ones and trees of links.
+//! Bodies of a model as bodies of a scene: static ones, rigid ones and trees of links. `mocap.rs` has kinematic ones.
 
 use nalgebra::{Translation3, one};
 use tumble_core::articulated::LinkMass;
@@ -15,7 +15,7 @@ use crate::parse::appearance::AppearanceSpec;
 use crate::parse::articulated::ArticulatedSpec;
 use crate::parse::body::{BodySpec, MassSpec};
 use crate::parse::joint::JointSpec;
-use crate::parse::link::{LinkMassSpec, LinkSpec};
+use crate::parse::link::{LinkMassSpec, LinkSpec, Surface};
 use crate::parse::mount::Mounts;
 use crate::parse::shape::{CompoundPartSpec, PartFilter, ShapeSpec};
 use crate::parse::view::GroundSpec;
@@ -28,21 +28,25 @@ impl Assembly<'_, '_> {
         order.sort_by_key(|body| self.fixed[*body]);
         let roots = order.iter().copied().filter(|&b| !self.fixed[b] && self.fixed[self.bodies[b].parent]);
         for body in roots.collect::<Vec<_>>() {
+            if self.mocap_of(self.bodies[body].parent).is_some() {
+                let why = "bodies with joints below a mocap body are fixed to the world: they do not follow it";
+                self.reader.notes.add(&self.bodies[body].element, why);
+            }
             if !(self.is_free_leaf(body) && self.add_rigid(body)) {
                 self.add_tree(body);
             }
         }
         for body in 0..self.bodies.len() {
-            match self.fixed[body] {
-                true if self.bodies[body].mocap => self.add_mocap(body),
-                true => self.add_static(body),
-                false => {}
+            match self.mocap_of(body) {
+                Some(mocap) if mocap == body => self.add_mocap(body),
+                None if self.fixed[body] => self.add_static(body),
+                _ => {}
             }
         }
     }
 
     /// Returns the name of a body: its own, or one with its number.
-    fn name_of(&self, body: usize) -> String {
+    pub(super) fn name_of(&self, body: usize) -> String {
         self.bodies[body].name.clone().unwrap_or_else(|| format!("body{body}"))
     }
 
@@ -58,7 +62,7 @@ impl Assembly<'_, '_> {
             let owner = if body == 0 { "world".to_owned() } else { self.name_of(body) };
             let name = geom.name.clone().unwrap_or_else(|| format!("{owner}/geom{k}"));
             let (name, shape) = (self.taken.unique(name), self.meshes.shape(made));
-            let spec = self.body_spec(name, Mode::Static, shape, &(pose * geom.pose), geom);
+            let spec = body_spec(name, Mode::Static, shape, &(pose * geom.pose), self.groups.surface(geom));
             let shape_name = geom.name.clone();
             let spec = BodySpec { collidable, visible: geom.visible, shape_name, ..spec };
             self.statics[body].push((k, self.scene.bodies.len()));
@@ -76,28 +80,6 @@ impl Assembly<'_, '_> {
         let appearance = if plain { GroundSpec::default_appearance() } else { geom.appearance.clone() };
         self.scene.ground = Some(GroundSpec { height_m: pose.translation.z, appearance });
         BodySpec { visible: false, ..spec }
-    }
-
-    /// Adds a kinematic body.
-    fn add_mocap(&mut self, body: usize) {
-        let mut parts = Vec::new();
-        for geom in self.bodies[body].geoms.iter().filter(|geom| geom.visible || self.groups.collides(geom)) {
-            match make(geom, self.reader) {
-                Some(made) => parts.push((geom, self.meshes.shape(made))),
-                None => continue,
-            }
-        }
-        let Some((first, _)) = parts.first() else { return };
-        let first = *first;
-        let (shape, shape_name) = joined(parts.iter().map(|(geom, shape)| (*geom, shape.clone())).collect());
-        let name = self.taken.unique(self.name_of(body));
-        let spec = self.body_spec(name, Mode::Kinematic, shape, &self.poses[body], first);
-        let collidable = self.groups.collides(first);
-        self.statics[body] = (0..self.bodies[body].geoms.len()).map(|k| (k, self.scene.bodies.len())).collect();
-        let given = Some(self.masses[body]).filter(|m| m.mass > 0.0 && self.bodies[body].inertial.is_some());
-        let (mass, center_m) = (given.map(|m| MassSpec::Mass(m.mass)), given.map(|m| m.center.into()));
-        let inertia_kg_m2 = given.map(|m| m.inertia);
-        self.scene.bodies.push(BodySpec { collidable, shape_name, mass, center_m, inertia_kg_m2, ..spec });
     }
 
     /// Adds a free body as a rigid body. Returns whether that can express it.
@@ -119,11 +101,12 @@ impl Assembly<'_, '_> {
         let mut parts = Vec::new();
         for geom in &own.geoms {
             let Some(made) = make(geom, self.reader) else { return false };
-            parts.push((geom, self.meshes.shape(made)));
+            parts.push(part(geom, self.meshes.shape(made)));
         }
         let name = self.taken.unique(self.name_of(body));
         let (shape, shape_name) = joined(parts);
-        let spec = self.body_spec(name, Mode::Dynamic, shape, &self.poses[body], &own.geoms[0]);
+        let surface = self.groups.surface(&own.geoms[0]);
+        let spec = body_spec(name, Mode::Dynamic, shape, &self.poses[body], surface);
         self.places[body] = Place::Rigid(self.scene.bodies.len());
         self.scene.bodies.push(BodySpec {
             mass: Some(MassSpec::Mass(mass.mass)),
@@ -134,41 +117,6 @@ impl Assembly<'_, '_> {
             ..spec
         });
         true
-    }
-
-    fn body_spec(&self, name: String, mode: Mode, shape: ShapeSpec, pose: &Pose, geom: &Geom<'_>) -> BodySpec {
-        let surface = self.groups.surface(geom);
-        let q = pose.rotation.coords;
-        BodySpec {
-            name,
-            mode,
-            shape,
-            shape_name: None,
-            mass: None,
-            position_m: pose.translation.vector.into(),
-            orientation_xyzw: [q.x, q.y, q.z, q.w],
-            velocity_m_per_s: [0.0; 3],
-            angular_velocity_rad_per_s: [0.0; 3],
-            material: surface.material,
-            contact: surface.contact,
-            contacts: surface.contacts,
-            center_m: None,
-            inertia_kg_m2: None,
-            gravity_scale: 1.0,
-            locked: LockedAxes::default(),
-            linear_damping_per_s: 0.0,
-            angular_damping_per_s: 0.0,
-            collidable: true,
-            group: surface.group,
-            mask: surface.mask,
-            sensor: false,
-            one_way: None,
-            enabled: true,
-            visible: true,
-            sound: None,
-            appearance: surface.appearance,
-            mounts: Mounts::default(),
-        }
     }
 
     /// Adds a body that moves and all below it as an articulated body.
@@ -265,6 +213,41 @@ impl Assembly<'_, '_> {
     }
 }
 
+/// Returns a body with a pose, a surface, and defaults.
+pub(super) fn body_spec(name: String, mode: Mode, shape: ShapeSpec, pose: &Pose, surface: Surface) -> BodySpec {
+    let q = pose.rotation.coords;
+    BodySpec {
+        name,
+        mode,
+        shape,
+        shape_name: None,
+        mass: None,
+        position_m: pose.translation.vector.into(),
+        orientation_xyzw: [q.x, q.y, q.z, q.w],
+        velocity_m_per_s: [0.0; 3],
+        angular_velocity_rad_per_s: [0.0; 3],
+        material: surface.material,
+        contact: surface.contact,
+        contacts: surface.contacts,
+        center_m: None,
+        inertia_kg_m2: None,
+        gravity_scale: 1.0,
+        locked: LockedAxes::default(),
+        linear_damping_per_s: 0.0,
+        angular_damping_per_s: 0.0,
+        collidable: true,
+        group: surface.group,
+        mask: surface.mask,
+        sensor: false,
+        one_way: None,
+        enabled: true,
+        visible: true,
+        sound: None,
+        appearance: surface.appearance,
+        mounts: Mounts::default(),
+    }
+}
+
 /// Half of the widest limits of a twist, rad.
 const WIDEST_TWIST: f64 = 0.75 * std::f64::consts::PI;
 
@@ -293,19 +276,23 @@ fn add_frame(links: &mut Vec<LinkSpec>, taken: &mut Taken, carrier: usize, label
     links.push(LinkSpec { mounts, ..link_spec(name, Some(carrier), pose, joint, LinkMass::none()) });
 }
 
-/// Returns one shape of several in the same frame, and its name, unless it is a compound, whose parts have names.
-fn joined(mut parts: Vec<(&Geom<'_>, ShapeSpec)>) -> (ShapeSpec, Option<String>) {
-    if parts.len() == 1 && parts[0].0.pose == Pose::identity() {
-        let (geom, shape) = parts.remove(0);
-        return (shape, geom.name.clone());
-    }
-    let part = |(geom, shape): (&Geom<'_>, ShapeSpec)| CompoundPartSpec {
+/// Returns a geom as a part of its body, with this shape.
+pub(super) fn part(geom: &Geom<'_>, shape: ShapeSpec) -> CompoundPartSpec {
+    CompoundPartSpec {
         shape,
         pose: geom.pose,
         density_kg_per_m3: None,
         surface: None,
         filter: PartFilter::default(),
         name: geom.name.clone(),
-    };
-    (ShapeSpec::Compound { parts: parts.into_iter().map(part).collect() }, None)
+    }
+}
+
+/// Returns one shape of several in the same frame, and its name, unless it is a compound, whose parts have names.
+pub(super) fn joined(mut parts: Vec<CompoundPartSpec>) -> (ShapeSpec, Option<String>) {
+    if parts.len() == 1 && parts[0].pose == Pose::identity() {
+        let CompoundPartSpec { shape, name, .. } = parts.remove(0);
+        return (shape, name);
+    }
+    (ShapeSpec::Compound { parts }, None)
 }

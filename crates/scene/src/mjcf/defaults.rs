@@ -101,6 +101,17 @@ impl<'a> Classes<'a> {
         found
     }
 
+    /// Returns the parent of each class, and its defaults of actuators. A class comes after its parent.
+    pub(super) fn actuators(&self) -> impl Iterator<Item = (Option<usize>, impl Iterator<Item = &Element<'a, 'a>>)> {
+        let is_actuator = |element: &&Element<'_, '_>| ACTUATORS.contains(&element.tag());
+        self.all.iter().map(move |class| (class.parent, class.elements.iter().filter(is_actuator)))
+    }
+
+    /// Returns the class that an element names, or class 0.
+    pub(super) fn class_of(&self, element: &Element<'_, '_>) -> usize {
+        element.text("class").and_then(|name| self.names.get(name)).copied().unwrap_or(0)
+    }
+
     /// Returns an element with its defaults: those of its class, else of `around`.
     pub(super) fn item(&self, element: Element<'a, 'a>, around: usize) -> Item<'a> {
         let tag = element.tag();
@@ -169,6 +180,22 @@ impl<'a> Item<'a> {
         self.at(name).and_then(|element| element.number(name, bound)).unwrap_or(default)
     }
 
+    /// Returns the first coefficient of a polynomial, a number of at least 0; 0 if it is absent or wrong. The others are
+    /// left out with a note.
+    pub(super) fn first_coefficient(&self, name: &str, notes: &Ledger) -> f64 {
+        let Some(element) = self.at(name) else { return 0.0 };
+        let coefficients = element.list(name, 3, Bound::ANY).unwrap_or_default();
+        let Some((first, others)) = coefficients.split_first() else { return 0.0 };
+        if others.iter().any(|x| *x != 0.0) {
+            let why = "the second and third numbers of `stiffness` and `damping` are left out: forces are linear here";
+            notes.add(element, why);
+        }
+        if *first < 0.0 {
+            element.wrong(name, format_args!("{} as the first number", Bound::NOT_NEGATIVE.expected()));
+        }
+        first.max(0.0)
+    }
+
     /// Returns `N` numbers, if present; NaN if they are wrong.
     pub(super) fn numbers<const N: usize>(&self, name: &str) -> Option<[f64; N]> {
         self.at(name)?.numbers(name, Bound::ANY)
@@ -190,11 +217,11 @@ impl<'a> Item<'a> {
     }
 
     /// Returns whether a range applies: as the flag `name` says, and with `auto` if the range is
-    /// present.
+    /// present and its two numbers differ.
     pub(super) fn limited(&self, name: &str, range: &str, autolimits: bool) -> bool {
         match self.word(name, LIMITED).unwrap_or(None) {
             Some(limited) => limited,
-            None => autolimits && self.text(range).is_some(),
+            None => autolimits && self.text(range).is_some_and(|text| !is_empty_range(text)),
         }
     }
 
@@ -202,6 +229,12 @@ impl<'a> Item<'a> {
     pub(super) fn name(&self) -> Option<String> {
         self.own().text("name").map(cleaned).filter(|name| !name.is_empty())
     }
+}
+
+/// Returns whether a text is two equal numbers.
+fn is_empty_range(text: &str) -> bool {
+    let numbers: Vec<Option<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    matches!(numbers[..], [Some(low), Some(high)] if low == high)
 }
 
 /// Returns a name without control characters.

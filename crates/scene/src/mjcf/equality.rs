@@ -6,11 +6,11 @@ use tumble_core::collide::{Pose, Vec3};
 
 use super::defaults::Item;
 use super::names::find;
-use super::scene::{Assembly, Place};
+use super::scene::Assembly;
 use super::schema;
 use super::source::XmlNode;
 use crate::parse::joint::MimicSpec;
-use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec, PartSpec};
+use crate::parse::loop_joint::{LoopDofSpec, LoopJointSpec};
 use crate::parse::mimic::{JointMimicSpec, JointSideSpec};
 use crate::xml::Element;
 
@@ -53,17 +53,16 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
         let Some([frame_a, frame_b]) = frames(item, assembly.poses[a].inverse() * assembly.poses[b]) else { return };
         [(a, frame_a), (b, frame_b)]
     };
-    let ends = ends.map(|(body, frame)| match assembly.places[body] {
-        Place::World => (None, assembly.poses[body] * frame),
-        Place::Rigid(index) => (Some(PartSpec::Body(index)), frame),
-        Place::Link(tree, link) => (Some(PartSpec::Link(tree, link)), frame),
-    });
+    if ends.iter().all(|(body, _)| assembly.is_held(*body)) {
+        let why = "equality constraints between bodies that are fixed or mocap are left out";
+        return assembly.reader.notes.add(element, why);
+    }
+    let ends = ends.map(|(body, frame)| assembly.placed(body, &frame));
     let ((a, frame_a), (b, frame_b)) = match ends {
         [(Some(a), frame_a), b] if Some(a) != b.0 => ((a, frame_a), b),
         [fixed @ (None, _), (Some(b), frame_b)] => ((b, frame_b), fixed),
         _ => {
-            let why = "equality constraints within one body, or between fixed bodies, are left out";
-            return assembly.reader.notes.add(element, why);
+            return assembly.reader.notes.add(element, "equality constraints within one body are left out");
         }
     };
     let number = assembly.scene.loop_joints.len();
@@ -99,6 +98,7 @@ fn join(item: &Item<'_>, assembly: &mut Assembly<'_, '_>) {
 
 /// Returns the frames of a joint in both bodies. `reference` is the pose of the second in the first in the reference
 /// configuration. The `anchor` of a `<connect>` is a point of the first body, that of a `<weld>` a point of the second.
+/// The position of `relpose` is a point of the first body: that of the weld.
 fn frames(item: &Item<'_>, reference: Pose) -> Option<[Pose; 2]> {
     let anchor: Option<[f64; 3]> = item.numbers("anchor");
     let at = |p: [f64; 3]| Pose::translation(p[0], p[1], p[2]);
@@ -115,9 +115,8 @@ fn frames(item: &Item<'_>, reference: Pose) -> Option<[Pose; 2]> {
         let turn = Unit::try_new(Quaternion::new(p[3], p[4], p[5], p[6]), 1e-10)?;
         Some(Pose::from_parts(Vec3::new(p[0], p[1], p[2]).into(), turn))
     });
-    let relative = relative.unwrap_or(reference);
     let frame = at(anchor.unwrap_or_default());
-    Some([relative * frame, frame])
+    Some([relative.unwrap_or(reference * frame), frame])
 }
 
 /// Couples a joint to another, `q₁ − ref₁ = a₀ + a₁(q₂ − ref₂)`, or holds it.

@@ -57,9 +57,9 @@ impl<'a> JointItem<'a> {
         let kind = item.word("type", KINDS).unwrap_or(Kind::Hinge);
         if kind == Kind::Free {
             let joint = JointItem::free(element);
-            let passive = ["stiffness", "damping", "frictionloss", "armature"];
-            let [stiffness, damping, friction, armature] =
-                passive.map(|name| item.number(name, Bound::NOT_NEGATIVE, 0.0));
+            let [friction, armature] =
+                ["frictionloss", "armature"].map(|name| item.number(name, Bound::NOT_NEGATIVE, 0.0));
+            let [stiffness, damping] = ["stiffness", "damping"].map(|name| item.first_coefficient(name, &reader.notes));
             if stiffness > 0.0 || armature > 0.0 {
                 reader.notes.add(&element, "stiffness and armature of free joints are left out");
             }
@@ -76,9 +76,11 @@ impl<'a> JointItem<'a> {
         });
         let turn = |x: f64| if kind == Kind::Hinge { reader.compiler.angle(x) } else { x };
         let number = |name: &str| item.number(name, Bound::NOT_NEGATIVE, 0.0);
+        let first = |name: &str| item.first_coefficient(name, &reader.notes);
         let single = kind != Kind::Ball;
         let limited = item.limited("limited", "range", reader.compiler.autolimits);
-        if !limited && item.text("range").is_some() && item.text("limited").is_none() {
+        let is_dropped = !limited && !reader.compiler.autolimits;
+        if is_dropped && item.text("range").is_some() && item.text("limited").is_none() {
             reader.notes.add(&element, "a range without `limited` has no effect, since `autolimits` is false");
         }
         let limits = match limited && single && reader.limits {
@@ -95,10 +97,10 @@ impl<'a> JointItem<'a> {
                 .add(&element, "the limit of a ball joint's rotation becomes one of its swing, and one of its twist");
         }
         let rest = turn(item.number("springref", Bound::ANY, 0.0));
-        let stiffness = if reader.springs { number("stiffness") } else { 0.0 };
+        let stiffness = if reader.springs { first("stiffness") } else { 0.0 };
         let dof = DofSettings {
             limits,
-            damping: if reader.dampers { number("damping") } else { 0.0 },
+            damping: if reader.dampers { first("damping") } else { 0.0 },
             friction: if reader.friction { number("frictionloss") } else { 0.0 },
             spring: (stiffness > 0.0).then_some(Spring { stiffness, rest: if single { rest } else { 0.0 } }),
             ..DofSettings::default()

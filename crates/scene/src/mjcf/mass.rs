@@ -6,14 +6,16 @@ use tumble_core::collide::{Mat3, Vec3};
 
 use super::Reader;
 use super::compiler::FromGeoms;
+use super::geom::Geom;
 use super::tree::Body;
+use crate::parse::link::inertia_fault;
 
 /// Returns the mass of each body in its frame.
 pub(super) fn of_bodies(bodies: &[Body<'_>], reader: &Reader<'_>) -> Vec<LinkMass> {
     let compiler = &reader.compiler;
     let mut masses = vec![LinkMass::none(); bodies.len()];
     for (mass, body) in masses.iter_mut().zip(bodies).skip(1) {
-        let given = body.inertial.as_ref().map(|(_, mass)| *mass).filter(|_| compiler.from_geoms != FromGeoms::Always);
+        let given = given(body, reader);
         *mass = match (given, compiler.from_geoms) {
             (Some(given), _) => given,
             (None, FromGeoms::Never) => LinkMass::none(),
@@ -29,10 +31,29 @@ pub(super) fn of_bodies(bodies: &[Body<'_>], reader: &Reader<'_>) -> Vec<LinkMas
     masses
 }
 
-fn of_geoms(body: &Body<'_>, reader: &Reader<'_>) -> LinkMass {
+/// Returns the mass of `<inertial>`, if it counts. Geoms in the range of groups replace it with `inertiafromgeom="true"`.
+fn given(body: &Body<'_>, reader: &Reader<'_>) -> Option<LinkMass> {
+    let (element, mass) = body.inertial.as_ref()?;
+    if reader.compiler.from_geoms == FromGeoms::Always {
+        if heavy_geoms(body, reader).next().is_some() {
+            return None;
+        }
+        if let Some(fault) = inertia_fault(&mass.inertia).filter(|_| !reader.compiler.balance) {
+            element.problem("has an inertia that no body has", format!("expected {fault}"));
+        }
+    }
+    Some(*mass)
+}
+
+/// Returns the geoms whose groups add mass.
+fn heavy_geoms<'b, 'a>(body: &'b Body<'a>, reader: &Reader<'_>) -> impl Iterator<Item = &'b Geom<'a>> {
     let [low, high] = reader.compiler.mass_groups;
+    body.geoms.iter().filter(move |geom| (low..=high).contains(&geom.group))
+}
+
+fn of_geoms(body: &Body<'_>, reader: &Reader<'_>) -> LinkMass {
     let mut sum = LinkMass::none();
-    for geom in body.geoms.iter().filter(|geom| (low..=high).contains(&geom.group)) {
+    for geom in heavy_geoms(body, reader) {
         // A geom without mass needs no volume.
         if !geom.is_heavy() {
             continue;

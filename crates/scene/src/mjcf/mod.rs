@@ -13,7 +13,7 @@
 //! |---|---|
 //! | `<compiler>`, `<default>`, `<include>`, `<frame>`, `<replicate>` | resolved during reading |
 //! | `<option>` | gravity and time step of the world |
-//! | `<body>` without a joint above it | static bodies, one for each geom; kinematic ones for `mocap` |
+//! | `<body>` without a joint above it | static bodies, one for each geom; one kinematic body for `mocap` and all that is fixed to it |
 //! | `<body>` with one free joint and no child | a rigid body, if all its geoms collide in the same way |
 //! | other trees of `<body>` | an articulated body, named for its root; several joints of a body are a chain of massless links `BODY/JOINT` |
 //! | `<joint>` | limits, damping, dry friction, spring, armature; positions are those of MuJoCo, `ref` included |
@@ -36,6 +36,7 @@ mod compiler;
 mod defaults;
 mod equality;
 mod error;
+mod gains;
 mod geom;
 mod inertia;
 mod joint;
@@ -43,6 +44,7 @@ mod keyframe;
 mod load;
 mod mass;
 mod mesh;
+mod mocap;
 mod names;
 mod notes;
 mod options;

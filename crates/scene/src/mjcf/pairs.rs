@@ -56,7 +56,7 @@ fn exclude(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
             assembly.scene.articulated[tree].exclude_collisions.push([a, b]);
         }
         // Fixed bodies do not collide with each other.
-        [Place::World, Place::World] => {}
+        _ if assembly.is_held(a) && assembly.is_held(b) => {}
         _ => {
             let sides = [a, b].map(|body| sides_of(body, assembly));
             for (first, second) in sides[0].iter().flat_map(|a| sides[1].iter().map(move |b| (*a, *b))) {
@@ -70,7 +70,7 @@ fn exclude(element: &Element<'_, '_>, assembly: &mut Assembly<'_, '_>) {
 fn sides_of(body: usize, assembly: &Assembly<'_, '_>) -> Vec<PairSideSpec> {
     match assembly.places[body] {
         Place::World => assembly.statics[body].iter().map(|(_, index)| PairSideSpec::Body(*index)).collect(),
-        Place::Rigid(index) => vec![PairSideSpec::Body(index)],
+        Place::Rigid(index) | Place::Kinematic(index, _) => vec![PairSideSpec::Body(index)],
         Place::Link(tree, link) => vec![PairSideSpec::Link(tree, link)],
     }
 }

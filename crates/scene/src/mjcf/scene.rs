@@ -16,6 +16,7 @@ use super::{Reader, actuator, equality, inertia, keyframe, mass, pairs, schema, 
 use crate::parse::bound::Bound;
 use crate::parse::file::SceneFile;
 use crate::parse::log::Log;
+use crate::parse::loop_joint::PartSpec;
 use tumble_core::Combine;
 
 /// The counterpart of a body of the model in the scene.
@@ -25,6 +26,8 @@ pub(super) enum Place {
     World,
     /// A rigid body, by its index in the scene.
     Rigid(usize),
+    /// Part of the kinematic body of a mocap body, by its index in the scene, with its pose in that body.
+    Kinematic(usize, Pose),
     /// A link of an articulated body, by both indices.
     Link(usize, usize),
 }
@@ -44,7 +47,7 @@ pub(super) struct Assembly<'r, 'a> {
     pub(super) places: Vec<Place>,
     /// The link of each joint of each body, for those of articulated bodies.
     pub(super) joints: Vec<Vec<(usize, usize)>>,
-    /// Static or kinematic bodies of the scene for each geom of each fixed body.
+    /// Static bodies of the scene for each geom of each fixed body.
     pub(super) statics: Vec<Vec<(usize, usize)>>,
     pub(super) groups: Groups,
     pub(super) meshes: Meshes,
@@ -204,6 +207,21 @@ impl Assembly<'_, '_> {
             _ => None,
         });
         named.filter_map(|name| Some((name, self.reader.mesh_mass(name).err()?))).collect()
+    }
+
+    /// Returns the body or link that a body of the model became, `None` for the world, and a pose of the body in it.
+    pub(super) fn placed(&self, body: usize, pose: &Pose) -> (Option<PartSpec>, Pose) {
+        match self.places[body] {
+            Place::World => (None, self.poses[body] * pose),
+            Place::Rigid(index) => (Some(PartSpec::Body(index)), *pose),
+            Place::Kinematic(index, own) => (Some(PartSpec::Body(index)), own * pose),
+            Place::Link(tree, link) => (Some(PartSpec::Link(tree, link)), *pose),
+        }
+    }
+
+    /// Returns whether a body of the model is fixed to the world, or moves along a prescribed motion.
+    pub(super) fn is_held(&self, body: usize) -> bool {
+        matches!(self.places[body], Place::World | Place::Kinematic(..))
     }
 
     /// Returns whether a site is the place of a joint of `<equality>`, and nothing else.

@@ -19,7 +19,8 @@ const LOOKS: &str = "settings of MuJoCo's renderer are left out";
 const FLUID: &str = "forces of a fluid or an adhesive are left out";
 const SOLVER: &str = "settings of MuJoCo's solver and integrator are left out";
 const COMPILER: &str = "settings of MuJoCo's compiler without effect here are left out";
-const ACTIVATION: &str = "delays and activations of actuators are left out: their forces follow the control at once";
+pub(super) const ACTIVATION: &str =
+    "delays and activations of actuators are left out: their forces follow the control at once";
 
 pub(super) const COMPILER_ATTRIBUTES: Attributes = Attributes {
     used: &[

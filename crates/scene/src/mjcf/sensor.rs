@@ -72,7 +72,7 @@ fn one(element: &Element<'_, '_>, kind: SensorKind, assembly: &Assembly<'_, '_>)
             assembly.reader.notes.add(element, why);
             return None;
         }
-        let (part, pose) = placed(assembly, body, &assembly.bodies[body].sites[k].pose);
+        let (part, pose) = assembly.placed(body, &assembly.bodies[body].sites[k].pose);
         if part.is_none() && kind == SensorKind::Touch {
             assembly.reader.notes.add(element, "touch sensors on fixed bodies are left out");
             return None;
@@ -102,15 +102,6 @@ fn on_link(assembly: &Assembly<'_, '_>, body: usize) -> bool {
     matches!(assembly.places[body], Place::Link(..))
 }
 
-/// Returns the part that a body of the model became, and a pose of the body in it.
-fn placed(assembly: &Assembly<'_, '_>, body: usize, pose: &Pose) -> (Option<PartSpec>, Pose) {
-    match assembly.places[body] {
-        Place::World => (None, assembly.poses[body] * pose),
-        Place::Rigid(index) => (Some(PartSpec::Body(index)), *pose),
-        Place::Link(tree, link) => (Some(PartSpec::Link(tree, link)), *pose),
-    }
-}
-
 /// Returns the frame that two attributes name.
 fn frame(
     element: &Element<'_, '_>,
@@ -120,7 +111,7 @@ fn frame(
     match element.text(of_type) {
         Some("site") => {
             let (body, k) = find(element, named, &assembly.names.sites, false)?;
-            Some(placed(assembly, body, &assembly.bodies[body].sites[k].pose))
+            Some(assembly.placed(body, &assembly.bodies[body].sites[k].pose))
         }
         Some("xbody") => {
             let body = find(element, named, &assembly.names.bodies, false)?;
@@ -129,7 +120,7 @@ fn frame(
                 assembly.reader.notes.add(element, why);
                 return None;
             }
-            Some(placed(assembly, body, &Pose::identity()))
+            Some(assembly.placed(body, &Pose::identity()))
         }
         _ => {
             assembly.reader.notes.add(element, "sensors of frames other than sites and `xbody` are left out");

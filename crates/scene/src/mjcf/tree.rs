@@ -6,6 +6,7 @@ use tumble_core::articulated::LinkMass;
 use tumble_core::collide::{Mat3, Pose, Vec3};
 
 use super::Reader;
+use super::compiler::FromGeoms;
 use super::defaults::cleaned;
 use super::geom::{Geom, placed};
 use super::joint::JointItem;
@@ -227,7 +228,9 @@ impl<'a> Tree<'_, 'a> {
         if !mass.is_finite() || inertia.iter().any(|x| !x.is_finite()) {
             return;
         }
-        if let Some(fault) = inertia_fault(&inertia).filter(|_| !reader.compiler.balance) {
+        // `mass.rs` checks it if the geoms come first and there are none
+        let is_checked = !reader.compiler.balance && reader.compiler.from_geoms != FromGeoms::Always;
+        if let Some(fault) = inertia_fault(&inertia).filter(|_| is_checked) {
             let given = if full.is_some() { "fullinertia" } else { "diaginertia" };
             element.wrong(given, fault);
         }

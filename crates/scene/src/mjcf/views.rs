@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3};
 use tumble_core::collide::{Pose, Quat, Vec3};
 use tumble_core::{CameraMount, LightMount, Spread};
 
-use super::scene::Assembly;
+use super::scene::{Assembly, Place};
 use super::tree::{Body, Camera, Light};
 use crate::parse::mount::Mounts;
 use crate::parse::view::{CameraSpec, LightKind, LightSpec};
@@ -19,7 +19,8 @@ const MAX_LIGHTS: usize = 64;
 pub(super) fn read(assembly: &mut Assembly<'_, '_>) {
     let (bodies, reader) = (assembly.bodies, assembly.reader);
     let mut lights = Vec::new();
-    for (number, body) in bodies.iter().enumerate().filter(|(number, _)| assembly.fixed[*number]) {
+    let in_world = |number: &usize| assembly.places[*number] == Place::World;
+    for (number, body) in bodies.iter().enumerate().filter(|(number, _)| in_world(number)) {
         let pose = assembly.poses[number];
         for camera in &body.cameras {
             match &mut assembly.scene.camera {

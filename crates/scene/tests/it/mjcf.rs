@@ -400,3 +400,45 @@ fn a_quadruped_on_feet_of_all_laws_of_friction_steps() {
     }
     assert!(unconverged <= 30, "{unconverged} of 1000 steps");
 }
+
+/// MuJoCo 4.0 compiles this body to 4.1887902 kg and 0.01675516 kg·m², and refuses the inertia where it has no geom.
+#[test]
+fn an_inertia_that_geoms_replace_is_not_checked() {
+    let body = |geom: &str, how: &str| {
+        format!(
+            r#"<mujoco><compiler inertiafromgeom="{how}"/><worldbody><body name="b"><joint/>
+            <inertial pos="0 0 0" mass="1" diaginertia="1 1 9"/>{geom}</body></worldbody></mujoco>"#
+        )
+    };
+    let ball = r#"<geom size=".1"/>"#;
+    let scene = read(&body(ball, "true")).unwrap();
+    let LinkMassSpec::Given(mass) = scene.articulated[0].links[0].mass else { panic!() };
+    assert!((mass.mass - 4.1887902).abs() < 1e-7 && (mass.inertia[(0, 0)] - 0.01675516).abs() < 1e-8);
+    assert!(errors(&body("", "true"))[0].contains("has an inertia that no body has"));
+    assert!(errors(&body(ball, "auto"))[0].contains("diaginertia"));
+    // without a geom the numbers of <inertial> count, as in MuJoCo
+    let scene = read(&body("", "true").replace("1 1 9", "1 1 1")).unwrap();
+    let LinkMassSpec::Given(mass) = scene.articulated[0].links[0].mass else { panic!() };
+    assert_eq!((mass.mass, mass.inertia[(0, 0)]), (1.0, 1.0));
+}
+
+/// MuJoCo 4.0 compiles the first number to `jnt_stiffness` and `dof_damping`, the others to `jnt_stiffnesspoly` and
+/// `dof_dampingpoly`.
+#[test]
+fn polynomials_of_stiffness_and_damping_are_noted() {
+    let scene = worldbody(
+        r#"<body name="b"><joint stiffness="1 2 3" damping=".1 .2"/><geom size="0.1" pos=".3 0 0"/></body>
+           <body name="c"><joint stiffness="4 0 0" damping=".5"/><geom size="0.1" pos=".3 0 0"/></body>"#,
+    );
+    let dof = |tree: usize| &scene.articulated[tree].links[0].joint.dof;
+    assert_eq!((dof(0).spring.unwrap().stiffness, dof(0).damping), (1.0, 0.1));
+    assert_eq!((dof(1).spring.unwrap().stiffness, dof(1).damping), (4.0, 0.5));
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+    let note = &scene.notes[0];
+    assert!(note.contains("`stiffness` and `damping`"), "{note}");
+    let wrong = |joint: &str| {
+        format!(r#"<mujoco><worldbody><body><joint {joint}/><geom size=".1"/></body></worldbody></mujoco>"#)
+    };
+    assert!(errors(&wrong(r#"stiffness="-1 2""#))[0].contains("at least 0 as the first number"));
+    assert!(errors(&wrong(r#"damping="1 2 3 4""#))[0].contains("1 to 3 numbers"));
+}

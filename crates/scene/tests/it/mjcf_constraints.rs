@@ -170,8 +170,11 @@ fn frames_of_constraints_are_those_of_mujoco() {
         assert_eq!(points(&to_world), [Vec3::new(0.0, 0.0, -1.0), Vec3::new(1.0, 0.0, -1.0)]);
         let weld = joint(r#"<weld body1="a" body2="b"/>"#, keyframe);
         assert_eq!(points(&weld), [Vec3::new(1.0, 0.0, 0.0), Vec3::zeros()]);
+        let weld = joint(r#"<weld body1="a" body2="b" anchor="0 2 0"/>"#, keyframe);
+        assert_eq!(points(&weld), [Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.0, 2.0, 0.0)]);
+        // the position of `relpose` is the point of the weld in the first body
         let weld = joint(r#"<weld body1="a" body2="b" anchor="0 2 0" relpose="0 0 3 0 0 0 2"/>"#, keyframe);
-        assert_eq!(points(&weld), [Vec3::new(0.0, -2.0, 3.0), Vec3::new(0.0, 2.0, 0.0)]);
+        assert_eq!(points(&weld), [Vec3::new(0.0, 0.0, 3.0), Vec3::new(0.0, 2.0, 0.0)]);
         assert!((weld.anchors.unwrap()[0].rotation.angle() - std::f64::consts::PI).abs() < 1e-15);
     }
 }
@@ -193,6 +196,21 @@ fn errors_of_constraints_are_those_of_mujoco() {
         let ours = errors(&world)["e"];
         assert!(ours > 0.1 && (ours - theirs["e"]).abs() < 1e-12, "{equality}: {ours} {}", theirs["e"]);
     }
+}
+
+/// `efc_pos` of MuJoCo 4.0 is (0, −0.5, 0) at the start of this model, and `b − a` comes to rest at a length of √1.25 m.
+#[test]
+fn a_weld_with_a_pose_and_an_anchor_is_open_as_in_mujoco() {
+    let text = r#"<mujoco><option gravity="0 0 0"/><worldbody>
+        <body name="a"><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body>
+        <body name="b" pos="1 0 0"><freejoint/><geom size=".1" contype="0" conaffinity="0"/></body></worldbody>
+        <equality><weld name="w" body1="a" body2="b" anchor="0 .5 0" relpose="1 0 0 1 0 0 0"/></equality></mujoco>"#;
+    let scene = parse(text, "weld.xml", &MjcfOptions::default()).unwrap();
+    let (world, _) = scene.build().unwrap();
+    let error = world.get::<LoopJoint>(world.find("w").unwrap()).unwrap().position_error(&world.view()).unwrap();
+    assert!((error.distance - 0.5).abs() < 1e-15 && error.angle < 1e-15, "{} {}", error.distance, error.angle);
+    let [a, b] = scene.loop_joints[0].anchors.unwrap();
+    assert!(((a * b.inverse()).translation.vector.norm() - 1.25f64.sqrt()).abs() < 1e-15);
 }
 
 /// Joints of two robots that follow each other, bent at time 0.

@@ -5,6 +5,7 @@ use super::template::HEADER;
 use super::{EventError, ScriptedEvent, Template, Trigger};
 use crate::constraint::loop_joint::LoopJoint;
 use crate::object::Object;
+use crate::rigid::RigidBody;
 use crate::world::sleep::RestTimer;
 use crate::world::view::ObjectId;
 use crate::world::{StepError, World, WorldError};
@@ -57,9 +58,12 @@ impl World {
                 let (mut pose, mut motion) = (*pose, [*velocity, *angular_velocity]);
                 if let Some(from) = from {
                     let thrower = *self.part_state(*from, 0).ok_or(WorldError::Stale)?;
-                    pose = self.pose(*from, 0).ok_or(WorldError::Stale)? * pose;
-                    motion = motion.map(|v| thrower.pose.rotation * v);
-                    motion[0] += thrower.velocity_at(&pose.translation.vector);
+                    let frame = self.pose(*from, 0).ok_or(WorldError::Stale)?;
+                    pose = frame * pose;
+                    let center = pose.transform_point(&self.spawned_center(*template).into());
+                    motion = motion.map(|v| frame.rotation * v);
+                    motion[0] += thrower.velocity_at(&center.coords);
+                    motion[1] += thrower.angular_velocity;
                 }
                 self.spawn(*template, pose, motion)
             }
@@ -136,6 +140,12 @@ impl World {
         self.core.state.warm.forget(serial);
         (x[0], x[HEADER + chosen]) = (x[0] + 1.0, self.frame() as f64);
         self.write_state_of(template, &x)
+    }
+
+    /// Returns the center of mass of the bodies of a template in their frame, m.
+    fn spawned_center(&self, template: ObjectId) -> Vec3 {
+        let first = self.get::<Template>(template).and_then(|template| template.bodies.first().copied());
+        first.and_then(|id| self.get::<RigidBody>(id)).map_or_else(Vec3::zeros, RigidBody::center_of_mass)
     }
 
     /// Returns the center of mass of a part, world axes, m.
