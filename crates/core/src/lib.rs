@@ -38,6 +38,7 @@ mod object;
 pub mod prelude;
 mod report;
 mod rigid;
+mod rotation_vector;
 mod sensor;
 mod settings;
 pub mod solver;

@@ -1,6 +1,7 @@
 //! Rows of joints: limits, velocity limits, dry friction, drives, couplings (equations in `dof.rs`).
 
 use super::body::ArticulatedBody;
+use crate::articulated::model::coordinates::read_vector;
 use crate::articulated::model::dof::{DofSettings, Drive};
 use crate::articulated::swing::{Swing, turn_from};
 use crate::constraint::builder::RowBuilder;
@@ -9,7 +10,8 @@ use crate::constraint::loop_joint::near;
 use crate::constraint::rows::RowSet;
 use crate::contact::warm_starts::RowStart;
 use crate::object::part_state::StateRange;
-use crate::object::{Constraint, Level, RowTarget};
+use crate::object::{Constraint, Level, RowTarget, SpringRow};
+use crate::rotation_vector::RotationVector;
 use crate::world::view::WorldView;
 use smallvec::{SmallVec, smallvec};
 use tumble_collide::Vec3;
@@ -25,22 +27,32 @@ impl ArticulatedBody {
         !self.couplings.is_empty() || self.dofs().iter().any(rows)
     }
 
-    /// Calls `act` with each degree of freedom: the index of its velocity, its state and the position that springs see. Positions are 0
+    /// Calls `act` with each degree of freedom: the index of its velocity, its state and what springs see. Positions are 0
     /// if there are none.
-    fn each_dof<'a>(&'a self, x: &'a [f64], time: f64, mut act: impl FnMut(usize, DofState<'a>, f64)) {
+    fn each_dof<'a>(&'a self, x: &'a [f64], time: f64, mut act: impl FnMut(usize, DofState<'a>, Sprung)) {
         let n = self.model.positions();
         for link in self.model.links() {
             let dof = link.joint.dof();
             let own = &self.dofs()[link.v..link.v + dof];
-            let [driven, sprung] = match dof {
-                1 => [[x[link.q]; 3]; 2],
-                3 => ball_positions(&x[link.q..], own, time),
-                _ => [[0.0; 3]; 2],
+            let v = &x[n + link.v..];
+            let driven = match dof {
+                1 => [x[link.q]; 3],
+                3 => driven_positions(&x[link.q..], own, time),
+                _ => [0.0; 3],
             };
+            let turned = if dof == 3 { turned(&x[link.q..], v, own) } else { None };
             for (k, settings) in own.iter().enumerate() {
                 let limits = settings.limits.filter(|_| dof == 1);
-                let (q, rest) = if dof <= 3 { (driven[k], sprung[k]) } else { (0.0, 0.0) };
-                act(link.v + k, DofState { q, v: x[n + link.v + k], settings, limits }, rest);
+                let q = if dof <= 3 { driven[k] } else { 0.0 };
+                let sprung = match &turned {
+                    Some((from, vector)) => Sprung {
+                        position: from[k] + vector.r[k],
+                        rate: vector.rate[k],
+                        turns: Some(Turns::of(link.v, vector.gradient(k), v)),
+                    },
+                    None => Sprung { position: q, rate: v[k], turns: None },
+                };
+                act(link.v + k, DofState { q, v: v[k], settings, limits }, sprung);
             }
         }
     }
@@ -51,7 +63,12 @@ impl ArticulatedBody {
             return;
         }
         self.each_dof(x, time, |index, DofState { q, v, settings, .. }, sprung| {
-            out[index] += settings.spring_force(sprung) + settings.explicit_force(q, v);
+            out[index] += settings.explicit_force(q, v);
+            let force = settings.spring_force(sprung.position);
+            match sprung.turns {
+                Some(Turns { first, along, .. }) => (0..3).for_each(|k| out[first + k] += force * along[k]),
+                None => out[index] += force,
+            }
         });
     }
 
@@ -67,7 +84,9 @@ impl ArticulatedBody {
             let mut counts = Vec::with_capacity(self.dofs().len());
             self.each_dof(x, time, |_, dof, sprung| {
                 let mut count = 0;
-                forces_of(&dof, sprung, (level, time), |_| count += 1);
+                let spring = spring_of(&dof, &sprung, level);
+                spring.iter().for_each(|_| count += 1);
+                dof.forces(level, time, |_| count += 1);
                 counts.push(count);
             });
             counts
@@ -80,7 +99,7 @@ impl ArticulatedBody {
             let count = counts.next().unwrap_or(0);
             end += count;
             let damping = dof.settings.damping * dof.v;
-            let springs = usize::from(dof.spring(level, sprung).is_some());
+            let springs = usize::from(spring_of(&dof, &sprung, level).is_some());
             let resisting = usize::from(dof.settings.friction > 0.0) + usize::from(dof.settings.damping > 0.0);
             out[index] += h * match (dof.drive(level, time), level.soft_step()) {
                 (Some(_), soft) if count > 0 => {
@@ -96,8 +115,8 @@ impl ArticulatedBody {
     /// Returns the energy of the springs, J.
     pub(super) fn spring_energy(&self, x: &[f64]) -> f64 {
         let mut energy = 0.0;
-        self.each_dof(x, 0.0, |_, dof, q| {
-            energy += dof.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (q - s.rest).powi(2));
+        self.each_dof(x, 0.0, |_, dof, sprung| {
+            energy += dof.settings.spring.map_or(0.0, |s| 0.5 * s.stiffness * (sprung.position - s.rest).powi(2));
         });
         energy
     }
@@ -158,7 +177,16 @@ impl Constraint for ArticulatedBody {
         });
         self.each_velocity_limit(x, |index, sign, target| maker.row_of(target, index, sign));
         self.each_dof(x, view.time, |index, dof, sprung| {
-            forces_of(&dof, sprung, (level, view.time), |target| maker.row_of(target, index, 1.0));
+            if let Some(target) = spring_of(&dof, &sprung, level) {
+                match sprung.turns {
+                    None => maker.row_of(target, index, 1.0),
+                    Some(Turns { first, along, bias_acceleration }) => {
+                        let entries = [0, 1, 2].map(|k| (first + k, along[k]));
+                        maker.row(RowTarget { bias_acceleration, ..target }, &entries);
+                    }
+                }
+            }
+            dof.forces(level, view.time, |target| maker.row_of(target, index, 1.0));
         });
         for c in &self.couplings {
             let position = |dof| self.position_of(dof).map_or(0.0, |q| x[q]);
@@ -181,10 +209,39 @@ impl Constraint for ArticulatedBody {
     }
 }
 
-/// Calls `row` with the targets of the rows of a degree of freedom that carry forces: spring, dry friction, damping, drive.
-fn forces_of(dof: &DofState, sprung: f64, (level, time): (Level, f64), mut row: impl FnMut(RowTarget)) {
-    dof.spring(level, sprung).into_iter().for_each(&mut row);
-    dof.forces(level, time, row);
+/// The coordinate along which the spring of a degree of freedom pulls.
+struct Sprung {
+    /// rad or m.
+    position: f64,
+    /// rad/s or m/s.
+    rate: f64,
+    /// The row, if the joint is spherical.
+    turns: Option<Turns>,
+}
+
+/// The rate of a component of the rotation vector of a spherical joint.
+struct Turns {
+    /// The first degree of freedom of the joint.
+    first: usize,
+    /// The rate by the velocities of the three.
+    along: Vec3,
+    /// Its rate at constant velocities, rad/s².
+    bias_acceleration: f64,
+}
+
+impl Turns {
+    fn of(first: usize, [along, turning]: [Vec3; 2], v: &[f64]) -> Turns {
+        Turns { first, along, bias_acceleration: turning.dot(&read_vector(v)) }
+    }
+}
+
+/// Returns the target of the row of a spring, if it is a row.
+fn spring_of(dof: &DofState, sprung: &Sprung, level: Level) -> Option<RowTarget> {
+    let (spring, damping) = (dof.settings.spring?, dof.settings.damping);
+    let state = DofState { v: sprung.rate, q: dof.q, settings: dof.settings, limits: dof.limits };
+    let target = state.spring(level, sprung.position)?;
+    let row = SpringRow { extension: sprung.position - spring.rest, stiffness: spring.stiffness, damping };
+    Some(RowTarget { spring: Some(row), ..target })
 }
 
 /// A limit of a joint.
@@ -217,23 +274,30 @@ impl Limit {
     }
 }
 
-/// Returns the positions of the degrees of freedom of a spherical joint with the position numbers `q` that drives and springs
-/// see: their goal and the way from there.
-fn ball_positions(q: &[f64], dofs: &[DofSettings], time: f64) -> [[f64; 3]; 2] {
+/// Returns the positions of the degrees of freedom of a spherical joint with the position numbers `q` that drives see: their
+/// goal and the way from there.
+fn driven_positions(q: &[f64], dofs: &[DofSettings], time: f64) -> [f64; 3] {
     let target = |dof: &DofSettings| match &dof.drive {
         Drive::Position { target, .. } => Some(*target),
         Drive::Playback { motion, .. } => Some(motion.at(time).0),
         Drive::None | Drive::Velocity { .. } => None,
     };
+    if dofs.iter().all(|dof| target(dof).is_none()) {
+        return [0.0; 3];
+    }
+    let from = Vec3::from_fn(|k, _| target(&dofs[k]).unwrap_or(0.0));
+    (from + turn_from(q, &from)).into()
+}
+
+/// Returns the rest of the springs of a spherical joint with the position numbers `q` and the velocities `v`, and the rotation vector
+/// from there; `None` if it has no springs.
+fn turned(q: &[f64], v: &[f64], dofs: &[DofSettings]) -> Option<(Vec3, RotationVector)> {
     let rest = |dof: &DofSettings| dof.spring.map(|spring| spring.rest);
-    let from = |goal: &dyn Fn(&DofSettings) -> Option<f64>| {
-        if dofs.iter().all(|dof| goal(dof).is_none()) {
-            return [0.0; 3];
-        }
-        let from = Vec3::from_fn(|k, _| goal(&dofs[k]).unwrap_or(0.0));
-        (from + turn_from(q, &from)).into()
-    };
-    [from(&target), from(&rest)]
+    if dofs.iter().all(|dof| rest(dof).is_none()) {
+        return None;
+    }
+    let from = Vec3::from_fn(|k, _| rest(&dofs[k]).unwrap_or(0.0));
+    Some((from, RotationVector::inside(turn_from(q, &from), &read_vector(v))))
 }
 
 /// Makes rows on the generalized coordinates of the owner.

@@ -5,7 +5,7 @@
 //! ```text
 //! rule        λ = −h·k·(q₀ + α·(q₁ − q₀)),      q₁ = q₀ + h·((1 − α)·w₀ + α·w₁)          α = ½: midpoint,  1: backward Euler
 //! row         w₁ + R·λ = w*,    R = 1/(k·α²·h²),    w* = −(q₀ + α·(1 − α)·h·w₀)/(α²·h)
-//! α           ½·(1 + min(1, d·x)),    x = ¼·h²·k·K,    d = h·c·K
+//! α           ½·(1 + min(1, ¼·d)·x/(1 + x)),    x = ¼·h²·k·K,    d = h·c·K
 //! correction  g = q(x₁) − q₁,    K·μ + R·Σμ = −g
 //! ```
 //!
@@ -14,8 +14,9 @@
 //! `R·μ`: it hardly moves where the spring is soft, and in the limit of a stiff one as for a joint.
 //!
 //! *Damping acts at the end of a step.* On velocities that a stiff spring reverses in each step it does work
-//! before it takes some: the energy may grow by the factor `1 + ½d`. So stiff springs that are damped become implicit,
-//! with an error of the order `h⁴`, and decay as they would in reality within the step.
+//! before it takes some: the energy may grow by the factor `1 + ½d`, and a stiff spring hardly decays. So springs that are damped become
+//! implicit, with an error of the order `h⁴`. For `x` far above 1 the amplitude of a spring falls by `(1 − α)/α` in a step, which is
+//! `e^(−½d)` to first order: it decays as in reality, however stiff it is.
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -56,7 +57,8 @@ pub(super) fn make_implicit(work: &mut Workspace, level: Level) {
             continue;
         };
         let own = work.rows.own(&block, 0, 0);
-        let share = (h * damping * own * 0.25 * h * h * stiffness * own).min(1.0);
+        let (x, d) = (0.25 * h * h * stiffness * own, h * damping * own);
+        let share = (0.25 * d).min(1.0) * x / (1.0 + x);
         let (alpha, first) = (0.5 * (1.0 + share), -target.velocity - 4.0 * extension / h);
         let compliance = 1.0 / (stiffness * alpha * alpha * h * h);
         work.rows.blocks[contacts + i].compliance = compliance;

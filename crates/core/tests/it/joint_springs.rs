@@ -161,3 +161,69 @@ fn a_chain_of_stiff_joints_hangs_like_a_bar() {
         assert!((root - wanted).abs() < 1e-3 * wanted, "{stepper}: {root:.4e} rad instead of {wanted:.4e}");
     }
 }
+
+/// Least and largest energy, of the first one, of two links on a spherical joint with springs, which tumble in free space.
+fn tumbling(stepper: &str, rate: f64, stiffness: f64, damping: f64) -> [f64; 2] {
+    let mut world = World::new(Settings::default().with_dt(1.0 / rate).with_gravity(Vec3::zeros())).unwrap();
+    world.set_stepper(stepper_by_name(stepper).unwrap());
+    let inertia = Mat3::from_diagonal(&Vec3::new(4e-3, 5e-3, 6e-3));
+    let mass = LinkMass { mass: 1.0, center: Vec3::new(0.2, 0.0, 0.0), inertia };
+    let mut builder = ModelBuilder::new();
+    let one = builder.link("one", None, Joint::Floating, Pose::identity(), mass);
+    builder.link("other", Some(one), Joint::Spherical, Pose::translation(0.4, 0.0, 0.0), mass);
+    let mut body = ArticulatedBody::new("pair", builder.build().unwrap());
+    for k in 6..9 {
+        body.set_dof(
+            k,
+            DofSettings { spring: Some(Spring { stiffness, rest: 0.0 }), damping, ..DofSettings::default() },
+        )
+        .unwrap();
+    }
+    let id = world.add(body).unwrap();
+    let mut x = world.state_of(id).unwrap().to_vec();
+    let n = x.len();
+    x[n - 9..].copy_from_slice(&[0.5, 1.0, -0.7, 0.1, 0.2, 0.0, 2.0, -1.0, 1.5]);
+    world.write_state_of(id, &x).unwrap();
+    let start = world.energy().total();
+    (0..rate as usize).fold([1.0, 1.0], |[least, largest]: [f64; 2], _| {
+        world.step().unwrap();
+        let now = world.energy().total() / start;
+        [least.min(now), largest.max(now)]
+    })
+}
+
+#[test]
+fn springs_of_a_spherical_joint_of_any_stiffness_keep_their_energy() {
+    for (stepper, rate) in STEPPERS.into_iter().flat_map(|s| [60.0, 240.0].map(|rate| (s, rate))) {
+        for stiffness in [3e2, 1e3, 1e4, 1e5, 1e6, 1e8] {
+            let [least, largest] = tumbling(stepper, rate, stiffness, 0.0);
+            println!("{stepper} {rate} {stiffness:.0e}: {least:.5} {largest:.5}");
+            assert!(least > 0.99 && largest < 1.01, "{stepper} {rate} Hz {stiffness:.0e}: {least} {largest}");
+            let [_, largest] = tumbling(stepper, rate, stiffness, 0.1 * f64::sqrt(stiffness * 4e-3));
+            assert!(largest < 1.01, "{stepper} {rate} Hz {stiffness:.0e}, damped: {largest}");
+        }
+    }
+}
+
+/// A stiff spring reverses its velocity in each step. Damping takes energy all the same, and as much as in reality.
+#[test]
+fn damped_stiff_springs_decay_as_in_reality() {
+    for (stepper, joint) in STEPPERS.into_iter().flat_map(|s| joints().map(|joint| (s, joint))) {
+        for (stiffness, damping) in [(1e4, 1.0), (1e5, 1.0), (1e6, 10.0), (1e6, 1e3), (1e9, 1e4)] {
+            let spring = Some(Spring { stiffness, rest: START });
+            let (mut world, id) =
+                oscillator(joint, stepper, 1.0 / 60.0, DofSettings { spring, damping, ..DofSettings::default() });
+            world.write_state_of(id, &[START, 1.0]).unwrap();
+            let start = world.energy().total();
+            for _ in 0..120 {
+                world.step().unwrap();
+                let now = world.energy().total();
+                assert!(now <= start * (1.0 + 1e-9), "{stepper} {joint:?} {stiffness:.0e} {damping}: {now} J");
+            }
+            let decay = -(world.energy().total() / start).ln() * MASS / (2.0 * damping);
+            println!("{stepper} {joint:?} {stiffness:.0e} {damping}: {decay:.3} of the rate");
+            let wanted = if damping <= 10.0 { 0.7..1.3 } else { 0.0..f64::INFINITY };
+            assert!(wanted.contains(&decay), "{stepper} {joint:?} {stiffness:.0e} {damping}: {decay}");
+        }
+    }
+}

@@ -166,8 +166,11 @@ fn a_runtime_that_cannot_serve_is_named_and_one_that_hangs_is_not_awaited() {
     assert!(code == Some(1) && wrong.contains("OpenXR: the runtime has no XR_MND_headless"), "{wrong}");
     set(&place.folder, "no_headless", None);
     set(&place.folder, "no_headset", Some(""));
+    let start = Instant::now();
     let (code, wrong) = ends(&place, &["--openxr", "u"]);
-    assert!(code == Some(0) && wrong.matches("OpenXR: there is no headset (").count() == 1, "{wrong}");
+    // tried every two seconds, and said every ten
+    let said = wrong.matches("OpenXR: there is no headset (").count();
+    assert!(code == Some(0) && (1..=1 + start.elapsed().as_secs() / 10).contains(&(said as u64)), "{said}: {wrong}");
     set(&place.folder, "hang", Some(""));
     let (code, wrong) = ends(&place, &["--openxr", "u"]);
     assert!(code == Some(0), "{wrong}");

@@ -18,11 +18,12 @@
 //! those of the middle of the sub-step with `verlet` (implicit midpoint rule), with `rk4` and `dormand_prince` too where a
 //! world has rigid joints, and with the other integrators damping, springs and position drives are forces, as accurate as the integrator. The rule of springs is the
 //! implicit midpoint rule, which keeps their energy: a spring far stiffer than the step resolves swings by `±q` from step to
-//! step and needs damping to come to rest.
+//! step and needs damping to come to rest. With damping it becomes implicit up to the backward Euler method (`step/springs.rs`).
 //!
 //! Settings of degree of freedom `k` of a spherical joint act about axis `k` of the link. Rest positions and targets of the
 //! three are the components of one rotation vector `g` in the joint's frame, and the positions are `q = g + log(G⁻¹·R)` with
-//! `G = exp(g)`: drive and spring pull about the axis of the rotation that is left, if their gains are equal.
+//! `G = exp(g)`: a drive pulls about the axis of the rotation that is left, if its gains are equal, and springs along the
+//! gradients of the components (`rotation_vector.rs`), so they have a potential with any stiffnesses.
 //!
 //! | symbol | meaning |
 //! |---|---|

@@ -6,6 +6,7 @@ use crate::constraint::builder::RowBuilder;
 use crate::constraint::rows::RowSet;
 use crate::object::RowTarget;
 use crate::object::part_state::PartState;
+use crate::rotation_vector::RotationVector;
 use crate::world::view::WorldView;
 use nalgebra::RealField;
 use smallvec::{SmallVec, smallvec};
@@ -70,18 +71,6 @@ pub(super) struct JointEnd {
     /// State of the part, with the accelerations at zero force.
     pub part_state: PartState,
     frame: tumble_collide::Pose,
-}
-
-/// Returns `c = 1/θ² − cot(½θ)/(2θ)` of `J⁻¹(r) = 1 − ½[r] + c·[r]²` with `θ = |r|`, and `c'/θ`.
-fn second_factor(angle: f64) -> (f64, f64) {
-    if angle < 1e-2 {
-        let square = angle * angle;
-        return (1.0 / 12.0 + square / 720.0, 1.0 / 360.0 + square / 7560.0);
-    }
-    let (sin, cos) = nalgebra::ComplexField::sin_cos(0.5 * angle);
-    let (cot, square) = (cos / sin, angle * angle);
-    let slope = -2.0 / (square * angle) + cot / (2.0 * square) + 1.0 / (4.0 * angle * sin * sin);
-    (1.0 / square - cot / (2.0 * angle), slope / angle)
 }
 
 impl JointEnd {
@@ -396,22 +385,13 @@ impl EndPair {
     }
 
     /// Returns the components of the rotation vector from the orientation whose rotation vector in B's frame is `from` to that
-    /// of A, with the rows of their rates: `ṙ = J⁻¹(r)·ω`, so a spring along each has a potential.
+    /// of A, with the rows of their rates.
     pub fn turned_from(&self, from: &Vec3) -> [Coordinate; 3] {
-        let r = self.turn_from(from);
-        let to_b = self.b.frame.rotation.inverse();
-        let (omega, (c, slope)) = (to_b * self.omega(), second_factor(r.norm()));
-        let rate = omega - 0.5 * r.cross(&omega) + c * r.cross(&r.cross(&omega));
-        let c_rate = slope * r.dot(&rate);
+        let to_world = self.b.frame.rotation;
+        let vector = RotationVector::outside(self.turn_from(from), &(to_world.inverse() * self.omega()));
         [0, 1, 2].map(|k| {
-            let e = Vec3::ith(k, 1.0);
-            // the transpose of the inverse Jacobian, and its rate
-            let w = e + 0.5 * r.cross(&e) + c * r.cross(&r.cross(&e));
-            let w_rate = 0.5 * rate.cross(&e)
-                + c_rate * r.cross(&r.cross(&e))
-                + c * (rate.cross(&r.cross(&e)) + r.cross(&rate.cross(&e)));
-            let axis = self.b.frame.rotation * w;
-            self.rotation_along(r[k], &axis, &(self.turning_of_b(&axis) + self.b.frame.rotation * w_rate))
+            let [axis, turning] = vector.gradient(k).map(|v| to_world * v);
+            self.rotation_along(vector.r[k], &axis, &(self.turning_of_b(&axis) + turning))
         })
     }
 
