@@ -11,7 +11,7 @@ use super::service::Private;
 use super::wakeup::{self, Wakeup};
 use super::wire::HeaderWords;
 use crate::sync::transport::{FacetNumber, LinkError, Message};
-use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::node::{Node, NodeBuilder, NodeCreationFailure};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::{
     AllocationStrategy, Config, FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level,
@@ -28,6 +28,9 @@ pub const DOWN_BYTES: usize = 128 << 10;
 pub const UP_BYTES: usize = 16 << 10;
 /// Timeout for the clean-up of one node that another process cleans up.
 const CLEAN_UP_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(2);
+/// Number of further tries to give a node its number, and the time between them.
+const ID_TRIES: u32 = 10;
+const ID_PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
 /// Number of samples in the buffer of a slow reader.
 const BUFFER_SAMPLES: usize = 8;
 
@@ -216,7 +219,16 @@ fn node(name: &str) -> Result<(Node<Private>, NodeLock), LinkError> {
     config.global.set_root_path(&Path::new(text.as_bytes()).map_err(|why| unusable(&why))?);
     let name = name.try_into().map_err(|why| unusable(&why))?;
     let builder = NodeBuilder::new().name(&name).config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
-    let node = builder.create::<Private>().map_err(|why| unusable(&why))?;
+    let mut tries = 0..ID_TRIES;
+    let node = loop {
+        match builder.clone().create::<Private>() {
+            // another process makes the counter of nodes at this moment
+            Err(NodeCreationFailure::UnableToGenerateUniqueNodeId) if tries.next().is_some() => {
+                std::thread::sleep(ID_PAUSE);
+            }
+            made => break made.map_err(|why| unusable(&why))?,
+        }
+    };
     wakeup::clean_up(user);
     Ok((node, node_lock))
 }
