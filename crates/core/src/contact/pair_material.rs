@@ -113,6 +113,7 @@ impl PairMaterials {
     pub fn forget(&mut self, id: ObjectId) {
         let of = |side: &PairSide| matches!(side, PairSide::Part(other, _) | PairSide::Object(other) if *other == id);
         self.entries.retain(|sides, _| !sides.iter().any(of));
+        self.joined.retain(|parts| parts.iter().all(|(other, _)| *other != id));
         self.update();
     }
 

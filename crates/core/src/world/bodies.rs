@@ -71,7 +71,9 @@ impl World {
     pub fn set_enabled(&mut self, id: ObjectId, enabled: bool) -> Result<(), WorldError> {
         let mends = enabled && self.status(id).is_some_and(|status| !status.enabled);
         self.status_mut(id)?.enabled = enabled;
-        self.core.find_joined();
+        if self.object(id).is_some_and(|object| object.constraint().is_some()) {
+            self.core.find_joined();
+        }
         self.core.wake_near(id);
         if mends {
             self.find_turns(id); // it did not follow while it was broken

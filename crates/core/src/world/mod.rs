@@ -527,7 +527,9 @@ impl World {
         }
         core.owners[gone.state_range.parts.start..].iter_mut().for_each(|owner| owner.place -= 1);
         core.pair_materials.forget(id);
-        core.find_joined();
+        if gone.object.constraint().is_some() {
+            core.find_joined();
+        }
         core.contacts.retain(|c| c.a != id && c.b != id);
         core.events.retain(|event| !event.names(id));
         Ok(gone.object)
