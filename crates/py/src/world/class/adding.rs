@@ -190,8 +190,8 @@ impl World {
     /// that name no max_force. armature: inertia of its rotor, kg·m² or kg. dofs: dicts of these settings for each degree of freedom in the order of
     /// ``Joint.dofs``, where the joint has several; without them they are those of the first one, of a spherical joint of all three. breaking_force, N, and breaking_torque about the
     /// point, N·m: above one of them the joint breaks; ``events`` has a ``"joint_broken"`` then. The
-    /// bodies still collide with each other: ``set_pair_material(a, b, collides=False)``. Points and axes
-    /// are in the world. angle: rad, of a revolute joint that counts its turns, where its limits are more than 3π/2 apart or on one
+    /// bodies do not collide with each other, unless ``set_pair_material(a, b, collides=True)`` lets them; those of a distance, rope,
+    /// spring or pulley do. Points and axes are in the world. angle: rad, of a revolute joint that counts its turns, where its limits are more than 3π/2 apart or on one
     /// side: of the angles that its frames have now it takes the nearest to this number.
     #[pyo3(signature = (kind, a, b=None, point=None, axis=None, limits=None, drive=None, breaking_force=None, *, name="", second_point=None,
         second_axis=None, length=None, stiffness=0.0, rest=None, damping=0.0, friction=0.0, breaking_torque=None, teeth=None, radius=None, pitch=None, ratio=1.0, ground=None,
