@@ -333,3 +333,28 @@ fn hinged_boxes_come_to_rest_on_the_ground() {
         }
     }
 }
+
+/// A ball that a joint leads around on ground without friction: the joint has all of the centripetal force.
+#[test]
+fn a_joint_beside_a_contact_without_friction_reports_all_of_its_force() {
+    for stepper in STEPPERS {
+        let mut world = world(stepper, 1.0 / 60.0);
+        ground(&mut world, 0.0, 0.0);
+        let spin = Vec3::new(0.0, 0.0, 2.0);
+        let ball =
+            RigidBody::new(sphere(0.1)).with_name("ball").with_mass(1.0).with_pose(Pose::translation(1.0, 0.0, 0.1));
+        let smooth = Material { friction: 0.0, ..Material::default() };
+        let moving = ball.with_material(smooth).with_velocity(Vec3::new(0.0, 2.0, 0.0)).with_angular_velocity(spin);
+        let ball = world.add(moving).unwrap();
+        let pivot = Vec3::new(0.0, 0.0, 0.6);
+        let joint = LoopJoint::spherical_at("pivot", &world, Some((ball, 0)), None, pivot).unwrap();
+        let joint = world.add(joint).unwrap();
+        for frame in 0..60 {
+            let before = world.part_state(ball, 0).unwrap().velocity;
+            world.step().unwrap();
+            let change = (world.part_state(ball, 0).unwrap().velocity - before) * 60.0;
+            let off = (world.joint_force(joint).unwrap().force - change).xy().norm();
+            assert!(frame < 2 || off < 1e-2, "{stepper}: {off} N off of {} N", change.norm());
+        }
+    }
+}
