@@ -16,7 +16,8 @@
 //! so no gain is too stiff for the step. `backtracking` does the same, with forces that hold over
 //! the sub-step, if any soft row changes its velocity by more than half of it. Otherwise the rows are
 //! those of the middle of the sub-step with `verlet` (implicit midpoint rule), with `rk4` and `dormand_prince` too where a
-//! world has rigid joints, and with the other integrators damping, springs and position drives are forces, as accurate as the integrator. The rule of springs is the
+//! world has rigid joints, and with the other integrators damping, springs and position drives are forces, as accurate as
+//! the integrator. The rule of springs is the
 //! implicit midpoint rule, which keeps their energy: a spring far stiffer than the step resolves swings by `±q` from step to
 //! step and needs damping to come to rest. With damping it becomes implicit up to the backward Euler method (`step/springs.rs`).
 //!
