@@ -19,12 +19,14 @@ pub(super) struct Rounded {
     pub core: f64,
     /// `Q`, world axes.
     more: Option<Mat3>,
+    /// The radius of the rim or the longest half axis of the ellipsoid, m: over a small part of it `Q` holds.
+    size: f64,
 }
 
 impl Rounded {
     /// Returns a sphere about a core feature.
     pub fn sphere(core: f64) -> Rounded {
-        Rounded { core, more: None }
+        Rounded { core, more: None, size: 0.0 }
     }
 
     /// Returns the surface of one shape of a part, where it has a core radius (m), at a point (m) with an outward normal.
@@ -41,11 +43,12 @@ impl Rounded {
             other => other.map(|shape| (shape, state.pose)),
         };
         let Some((shape, pose)) = placed else { return Rounded::sphere(core) };
-        let (sphere, curved) = match shape {
-            Shape::Ellipsoid { .. } => (0.0, true),
-            Shape::Cylinder(_) | Shape::Cone { .. } => (core, core == 0.0),
-            Shape::RoundedCylinder { rounding, .. } => (core, core == *rounding),
-            _ => (core, false),
+        let (sphere, curved, size) = match shape {
+            Shape::Ellipsoid { half_axes } => (0.0, true, half_axes.max()),
+            Shape::Cylinder(cylinder) => (core, core == 0.0, cylinder.radius()),
+            Shape::Cone { radius, .. } => (core, core == 0.0, *radius),
+            Shape::RoundedCylinder { core: inner, rounding } => (core, core == *rounding, inner.radius()),
+            _ => (core, false, 0.0),
         };
         let local = || {
             let point = pose.inverse_transform_point(&point.into()).coords;
@@ -53,7 +56,7 @@ impl Rounded {
         };
         let Some(local) = curved.then(local).flatten() else { return Rounded::sphere(core) };
         let axes = pose.rotation.to_rotation_matrix().into_inner();
-        Rounded { core: sphere, more: Some(axes * local * axes.transpose()) }
+        Rounded { core: sphere, more: Some(axes * local * axes.transpose()), size }
     }
 
     /// Returns `P·ṅ` for a rate of the normal, 1/s.
@@ -64,6 +67,12 @@ impl Rounded {
     /// Returns `Q·ṅ` for a rate of the normal, 1/s.
     pub fn by_curvature(&self, normal: &Vec3) -> Vec3 {
         self.more.map_or(Vec3::zeros(), |more| more * normal)
+    }
+
+    /// Returns how far the normal and the point turn over the surface for a change of the normal against the material, rad: `Q` is
+    /// that of the point where it is.
+    pub fn turn(&self, normal: &Vec3) -> f64 {
+        self.more.map_or(0.0, |more| normal.norm().max((more * normal).norm() / self.size))
     }
 
     /// Returns the sum of both `Q`, if either has one.

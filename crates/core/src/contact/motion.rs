@@ -63,8 +63,8 @@ impl Moved {
     }
 }
 
-/// Maximum angle by which the normal of a contact that lasts turns, rad: an edge that slides past a corner has
-/// a contact for a moment.
+/// Maximum angle by which the normal of a contact that lasts turns, and by which it turns over a surface whose curvature varies, rad:
+/// an edge that slides past a corner has a contact for a moment, and the lowest point of a disc that falls flat runs around its rim.
 const MAX_TURN: f64 = 0.5;
 /// A smaller radius of curvature, in parts of the mean one, is that of a sharp feature.
 const SHARP: f64 = 1e-9;
@@ -220,7 +220,8 @@ impl ContactConstraint {
         shape: impl Fn(u32) -> Option<&'s Shape>,
     ) {
         let Contact { point, normal, .. } = self.contact;
-        let motion = self.motion_on([a, b], self.surfaces([a, b], shape));
+        let surfaces = self.surfaces([a, b], shape);
+        let motion = self.motion_on([a, b], surfaces);
         let (mut rate, mut of_links, mut of_driven) = (self.rate(&motion, [a, b]), Vec3::zeros(), Vec3::zeros());
         for (sign, part, state) in [(1.0, self.a, a), (-1.0, self.b, b)] {
             match carrier(part) {
@@ -230,7 +231,9 @@ impl ContactConstraint {
             }
         }
         let left = time - self.found_at;
-        if left.abs() * motion.normal_rate.norm() > MAX_TURN || self.contact.normal_from == NormalFrom::Edges {
+        let over = |on: &Rounded, s: &PartState| on.turn(&(s.angular_velocity.cross(&normal) - motion.normal_rate));
+        let turn = motion.normal_rate.norm().max(over(&surfaces[0], a)).max(over(&surfaces[1], b));
+        if left.abs() * turn > MAX_TURN || self.contact.normal_from == NormalFrom::Edges {
             return;
         }
         let way = self.found_at * a.velocity + left * motion.point_rate - motion.side * self.gap_found() * normal;

@@ -41,7 +41,7 @@ use super::pyramids;
 use super::reduced::Reduced;
 use super::relaxation::Relaxation;
 use super::{RIGID, RowSolver, SolveReport, SolverSettings, residual};
-use crate::constraint::rows::{RowSet, Rows, dot};
+use crate::constraint::rows::{Block, RowSet, Rows, dot};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
@@ -67,6 +67,9 @@ const FEW: usize = 120;
 /// Under a budget an island is solved directly only if it can pay for this number of factorizations:
 /// the interior point method gives little before its end.
 const AFFORDABLE: f64 = 12.0;
+
+/// An unfinished direct solution that makes rows faster than they were by more than this factor is not taken.
+const RUNAWAY: f64 = 10.0;
 
 /// Islands of more blocks are solved if their residual is at most [`SOLVED`] tolerances; from smaller
 /// ones the direct solution gains more digits for little.
@@ -238,12 +241,14 @@ impl Solve<'_> {
                 }
             }
             if let Some(plan) = plan.take_if(|_| sweep == due.min(sweeps)) {
-                let cost = plan.cost();
+                self.rebuild();
+                let (cost, swept) = (plan.cost(), self.lambda.to_vec());
                 let most = affordable.map_or(u32::MAX, |affordable| ((affordable - f64::from(sweep)) / cost) as u32);
                 outcome = self.solve_whole(plan, most);
                 outcome.relaxations = (f64::from(outcome.iterations) * cost * count as f64) as u32;
                 self.finish_rows(&mut outcome);
                 self.finish_by_pivoting(&mut outcome);
+                self.refuse_runaway(&outcome, &swept);
                 outcome.iterations += sweep;
                 outcome.relaxations += sweep * count as u32;
                 direct = true;
@@ -329,7 +334,6 @@ impl Solve<'_> {
 
     /// Solves the island directly, by at most `most` factorizations: the iterations of the report.
     fn solve_whole(&mut self, plan: Plan, most: u32) -> SolveReport {
-        self.rebuild();
         let solved = plan.solve(self.lambda, self.settings.tolerance, most);
         self.read();
         SolveReport { iterations: solved.factorizations, converged: solved.converged, ray: false, relaxations: 0 }
@@ -376,6 +380,28 @@ impl Solve<'_> {
         outcome.converged = solved.converged;
         outcome.iterations += solved.factorizations;
         outcome.relaxations += (f64::from(solved.factorizations) * island.cost() * self.locals.len() as f64) as u32;
+    }
+
+    /// Takes the multipliers of the sweeps back if direct solution ended unfinished with velocities far above those of the problem: what
+    /// is jammed between bodies that nothing stops has no solution, and the attempts get multipliers of any size.
+    fn refuse_runaway(&mut self, outcome: &SolveReport, swept: &[f64]) {
+        if outcome.converged {
+            return;
+        }
+        let rows = || self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]);
+        let speed = |du: &[f64]| {
+            let of_block = |block: &Block| {
+                let fastest = |(k, row): (usize, usize)| (self.c[row] + self.rows.row_velocity(block, k, du)).abs();
+                block.range().enumerate().map(fastest).fold(0.0, f64::max)
+            };
+            rows().map(of_block).fold(0.0, f64::max)
+        };
+        let free = vec![0.0; self.du.len()];
+        if speed(self.du) <= RUNAWAY * speed(&free) {
+            return;
+        }
+        self.lambda.copy_from_slice(swept);
+        self.read();
     }
 
     /// Scales the multipliers so that they add no energy.

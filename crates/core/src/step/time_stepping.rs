@@ -269,7 +269,9 @@ impl TimeStepping {
             let constraint = &work.contact_constraints[i];
             let stops = self.candidates.get(i).is_some_and(|candidate| candidate.stops);
             if !stops && constraint.moved.changes() && moving::touches(core, constraint, 0.5 * h) {
-                moving::add_motion(work, i, &free, h);
+                let block = &work.rows.blocks[i];
+                let comes = before[block.row as usize] - work.rows.row_velocity(block, 0, du_force);
+                moving::add_motion(work, i, &free, (comes, h));
             }
         }
         far.clear();

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::loop_joints::{AXIS, FourBar, bar, hinge};
-use tumble_core::collide::Vec3;
+use tumble_core::collide::{Pose, Shape, Vec3};
 use tumble_core::*;
 
 /// Returns the angle of the crank of the four-bar linkage after half a second, rad.
@@ -109,5 +109,30 @@ fn a_chain_in_space_keeps_its_energy() {
         let errors = [60.0, 120.0, 240.0].map(|rate| whirl(stepper, rate));
         println!("{stepper}: {errors:?}");
         assert!(errors.iter().all(|e| *e < 1e-6), "{stepper}: {errors:?}");
+    }
+}
+
+/// A ball circles on a rod that ends at its center. No force of the rod turns the ball.
+#[test]
+fn a_joint_at_the_center_of_a_ball_leaves_its_spin() {
+    for stepper in STEPPERS {
+        for rate in [60.0, 240.0] {
+            let mut world = world(stepper, 1.0 / rate);
+            world.set_settings(world.settings().with_gravity(Vec3::zeros())).unwrap();
+            let ball = RigidBody::new(Shape::sphere(0.1).unwrap()).with_mass(1.0);
+            let ball = ball.with_pose(Pose::translation(0.5, 0.0, 0.0)).with_velocity(3.0 * Vec3::y());
+            let ball = world.add(ball.with_angular_velocity(2.0 * Vec3::z())).unwrap();
+            let place = JointPlace::between(Vec3::x() * 0.5, Vec3::zeros());
+            let rod = LoopJoint::joining("rod", LoopJointKind::Distance, &world, Some((ball, 0)), None, place).unwrap();
+            world.add(rod).unwrap();
+            let before = world.energy().total();
+            (0..(20.0 * rate) as usize).for_each(|_| {
+                world.step().unwrap();
+            });
+            let spin = world.part_state(ball, 0).unwrap().angular_velocity.z;
+            let energy = world.energy().total() / before - 1.0;
+            println!("{stepper} {rate} Hz: spin {spin}, energy {energy:.1e}");
+            assert!((spin - 2.0).abs() < 1e-9 && energy.abs() < 1e-4, "{stepper} {rate}: {spin} {energy}");
+        }
     }
 }

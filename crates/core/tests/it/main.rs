@@ -91,6 +91,7 @@ mod regressions;
 mod regressions_articulated;
 mod regressions_rows;
 mod removal;
+mod round_shapes_energy;
 mod runaway;
 mod saved_drives;
 mod scripted_events;

@@ -177,3 +177,90 @@ fn fast_cubes_do_not_go_through_a_thin_plate() {
         }
     }
 }
+
+/// Two plates close on a body that lies between them, to less than its size. It cannot turn out of the way for ever, and no
+/// solution exists; it must not be shot away.
+#[test]
+fn a_vice_does_not_shoot_what_it_closes_on() {
+    let shapes = [
+        ("cone", Shape::cone(0.125, 0.25).unwrap()),
+        ("box", Shape::cuboid(Vec3::new(0.25, 0.2, 0.3)).unwrap()),
+        ("wedge", Shape::mesh(TriMesh::cuboid(Vec3::new(0.3, 0.2, 0.25)), &TreeSettings::octree()).unwrap()),
+        ("cylinder", Shape::cylinder(0.12, 0.25).unwrap()),
+    ];
+    for stepper in STEPPERS {
+        for (name, shape) in &shapes {
+            let mut fastest = 0.0f64;
+            for case in 0..4 {
+                let mut world = world(stepper, 1.0 / 60.0);
+                let material = Material { friction: 0.5, restitution: 0.0, ..Material::default() };
+                world
+                    .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material))
+                    .unwrap();
+                for side in [-1.0, 1.0] {
+                    let plate = RigidBody::new(Shape::cuboid(Vec3::new(0.2, 2.0, 2.0)).unwrap())
+                        .with_pose(Pose::translation(0.5 * side, 0.0, 1.0))
+                        .with_velocity(Vec3::x() * (-0.5 * side));
+                    world.add_boxed(Box::new(plate.with_mass(1.0).with_material(material)), Mode::Kinematic).unwrap();
+                }
+                let turn = Vec3::new(0.3, 0.7, -0.2) * f64::from(case + 1);
+                let body = RigidBody::new(shape.clone()).with_density(1000.0).with_material(material);
+                let id = world.add(body.with_pose(Pose::new(Vec3::z() * 0.3, turn))).unwrap();
+                for _ in 0..45 {
+                    world.step().unwrap();
+                    fastest = fastest.max(world.part_state(id, 0).unwrap().velocity.norm());
+                }
+            }
+            println!("{stepper} {name}: at most {fastest:.2} m/s");
+            assert!(fastest < 20.0, "{stepper} {name}: {fastest} m/s");
+        }
+    }
+}
+
+/// A board and a prism fall on round rods that are longer than they are, and come to rest on both ends of each line of contact.
+#[test]
+fn flat_bodies_come_to_rest_on_round_rods() {
+    let turn = std::f64::consts::FRAC_PI_2 * Vec3::y();
+    let rods = [
+        ("cylinder", Shape::cylinder(0.02, 2.0).unwrap()),
+        ("rounded cylinder", Shape::rounded_cylinder(0.02, 2.0, 0.004).unwrap()),
+        ("capsule", Shape::capsule(0.02, 1.9).unwrap()),
+    ];
+    let corners = |k: i32| {
+        let angle = std::f64::consts::FRAC_PI_4 * (f64::from(k) + 0.5);
+        [-0.1, 0.1].map(|x| Vec3::new(x, 0.08 * angle.cos(), 0.08 * angle.sin()))
+    };
+    let prism = TriMesh::hull_of(&(0..8).flat_map(corners).collect::<Vec<_>>()).unwrap();
+    let bodies = [
+        ("board", Shape::cuboid(Vec3::new(0.3, 0.2, 0.02)).unwrap()),
+        ("prism", Shape::mesh(prism, &TreeSettings::octree()).unwrap()),
+    ];
+    for rate in [60.0, 240.0] {
+        for (rod_name, rod) in &rods {
+            for (name, shape) in &bodies {
+                let mut fastest = 0.0f64;
+                for case in 0..3 {
+                    let mut world = world("time_stepping", 1.0 / rate);
+                    for i in -4..5 {
+                        let place = Pose::new(Vec3::y() * (0.1 * f64::from(i)), turn);
+                        let fixed = RigidBody::fixed(rod.clone()).with_name(&format!("rod {i}")).with_pose(place);
+                        world.add_static(fixed).unwrap();
+                    }
+                    let spin = Vec3::new(-2.1, 4.7, 0.6) * (0.4 * f64::from(case));
+                    let tilt = Vec3::new(0.02, 0.03 * f64::from(case + 1), 0.4);
+                    let body = RigidBody::new(shape.clone()).with_density(1000.0).with_angular_velocity(spin);
+                    let id = world.add(body.with_pose(Pose::new(Vec3::z() * 0.3, tilt))).unwrap();
+                    for _ in 0..(5.0 * rate) as usize {
+                        world.step().unwrap();
+                    }
+                    let state = world.part_state(id, 0).unwrap();
+                    if state.position().z > -0.5 {
+                        fastest = fastest.max(state.velocity.norm()).max(state.angular_velocity.norm());
+                    }
+                }
+                println!("{rate} Hz, {name} on {rod_name}s: {fastest:.1e} m/s, rad/s");
+                assert!(fastest < 1e-3, "{rate} Hz, {name} on {rod_name}s: {fastest}");
+            }
+        }
+    }
+}

@@ -50,23 +50,23 @@ table! {
     [1.0, 10.0];
     billiards_time_stepping: "billiards", TimeStepping, "acec9cb7318c19f1", "85acd8b4d4045bee";
     billiards_backtracking: "billiards", Backtracking, "028b3fc6133e3084", "4948e3c8f0eb518d";
-    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "01b7a31ae78bf8a6";
+    bowling_time_stepping: "bowling", TimeStepping, "53e604fc6854b0f2", "311de4a4d588b58b";
     bowling_backtracking: "bowling", Backtracking, "8efe465a30ebc13b", "fadbe58c3fd1d0c3";
-    chain_time_stepping: "chain", TimeStepping, "1cae76a911fa5c84", "639eba67dd8ba5cf";
+    chain_time_stepping: "chain", TimeStepping, "d6f52c8eced3f294", "354d41d199dc5867";
     chain_backtracking: "chain", Backtracking, "e95b2c5fd7a05d9c", "209fc1911104a1b4";
-    falling_time_stepping: "falling", TimeStepping, "8cda3ff70cb1181e", "a0a3e89d897e9808";
+    falling_time_stepping: "falling", TimeStepping, "845f1f0a48541cdb", "2b235b255416c75e";
     flock_time_stepping: "flock", TimeStepping, "e41e23ddcc483acc", "1855f9c020bc971a";
     flock_backtracking: "flock", Backtracking, "af789340dc0ef11e", "6faef2e76a3efc30";
-    falling_backtracking: "falling", Backtracking, "d32d06cb04110657", "94b750c1b8b2d96d";
+    falling_backtracking: "falling", Backtracking, "9d661d033f1dd373", "5c45e8dafb36fc7c";
     incline_time_stepping: "incline", TimeStepping, "c7fceb815b144da9", "26dd7785db759c25";
     incline_backtracking: "incline", Backtracking, "f953d1e35a61b08a", "188ead72ee20f94b";
     pendulum_time_stepping: "pendulum", TimeStepping, "5d5a0c61633ceb71", "1f3184745a57812c";
     pendulum_backtracking: "pendulum", Backtracking, "69fe4156518a0013", "692b5de118331942";
     piston_time_stepping: "piston", TimeStepping, "b0c7d2b7ad732e80", "a0b3838111d7e4b1";
     piston_backtracking: "piston", Backtracking, "490cefd12db353ab", "7e34bcef17dc8c52";
-    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "ab1a03e9bd8ec5bb";
+    robot_time_stepping: "robot", TimeStepping, "a5c5395feda47469", "195aa5f921a7b2d5";
     robot_backtracking: "robot", Backtracking, "5d43b13f9771b917", "c622c65d53ec29f0";
-    skeleton_time_stepping: "skeleton", TimeStepping, "e4e23c0c3f5d9795", "aba735043a95bb06";
+    skeleton_time_stepping: "skeleton", TimeStepping, "87272ecc5d41db6a", "11f18378af840c16";
     skeleton_backtracking: "skeleton", Backtracking, "3972aeec7ed4684a", "0503afb338b9a6b0";
     stack_time_stepping: "stack", TimeStepping, "c9eeea26137d2a5f", "99d9eaf45acdf7b8";
     stack_backtracking: "stack", Backtracking, "8bf0d645b39a693b", "3d204eae8525be65";
@@ -85,17 +85,17 @@ table! {
     campfire_time_stepping: "campfire", TimeStepping, "b2b53ea54d16087f", "07e5ef35c0df9446";
     campfire_backtracking: "campfire", Backtracking, "b2b53ea54d16087f", "07e5ef35c0df9446";
     card_house_backtracking: "card_house", Backtracking, "628b1001c97d96e8", "ffb108b34f7b1912";
-    marble_run_time_stepping: "marble_run", TimeStepping, "a6aa80e60f400a7a", "b84fb5c5ad4c1869";
+    marble_run_time_stepping: "marble_run", TimeStepping, "d52361e606637d3b", "1bf68256a3ee7988";
     marble_run_backtracking: "marble_run", Backtracking, "d233e2869b9ec085", "65dc5e3b02c312fa";
     newtons_cradle_time_stepping: "newtons_cradle", TimeStepping, "612299c73004bdf4", "087f72ba625bf535";
     newtons_cradle_backtracking: "newtons_cradle", Backtracking, "1a0128aa197a01fb", "ecc9f19bdcb9f483";
     steam_engine_time_stepping: "steam_engine", TimeStepping, "a6c0231afb80a4ab", "d3520c2611ed1cae";
     steam_engine_backtracking: "steam_engine", Backtracking, "95124e328b286cfa", "1265d2cc6d6c5851";
     arch_time_stepping: "arch", TimeStepping, "7defd295d446fda8", "368220ae959f1b1e";
-    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "6e69fb4e45ddca89";
-    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "dd93b3ba2f28eb55";
-    mechanism_time_stepping: "mechanism", TimeStepping, "693bdfa98885bbc3", "2c657dfd986eeb83";
-    dominoes_time_stepping: "dominoes", TimeStepping, "3e999483436aff8f", "bc6eb97a7494a75e";
+    walker_time_stepping: "walker", TimeStepping, "8777a6192c315bf3", "78419b7aa839cab6";
+    wrecking_ball_time_stepping: "wrecking_ball", TimeStepping, "a3370f391f84a50c", "c58355862589602b";
+    mechanism_time_stepping: "mechanism", TimeStepping, "567e83b223ef83c7", "c0fcdb31517b4661";
+    dominoes_time_stepping: "dominoes", TimeStepping, "fa5dc5dc7e45ffba", "123cebc4c427a566";
 }
 
 table! {

@@ -52,6 +52,8 @@ const MIN_FOOT_OFFSET: f64 = 1e-6;
 const OTHER_FACE: f64 = 1e-6;
 /// Distance below a tangent that exceeds rounding, as a fraction of the smaller body's radius.
 const CONVEXITY_TOLERANCE: f64 = 1e-9;
+/// Largest slope of an axis over a face at which its surface meets the face where the axis leaves it, as far as a step turns it.
+const STEEPEST: f64 = 0.2;
 
 /// A straight element in the frame of the field.
 struct Line<'a> {
@@ -482,11 +484,15 @@ impl Query<'_> {
     }
 
     fn push_on_face(&self, line: &Line, sample: &Sample, s: f64, part: u64, found: &mut Collector) {
-        let hit = Hit { distance: sample.height(s), ..sample.hit };
-        if line.radius > 0.0 && sample.slope.abs() > SLOPE_ROUNDING {
-            return; // the surface of a cylinder is its radius away across the axis alone
+        // the surface of a cylinder is its radius away across the axis alone
+        let nearer = 1.0 - (1.0 - sample.slope * sample.slope).max(0.0).sqrt();
+        let hit = Hit { distance: sample.height(s) + line.radius * nearer, ..sample.hit };
+        if line.radius > 0.0 && sample.slope.abs() > STEEPEST {
+            return;
         }
-        if hit.facing && (hit.feature == Feature::Face || line.is_closest(&hit.normal)) {
+        // a rod along a face reaches both ends of it, tilted or not
+        let slope = if matches!(hit.feature, Feature::Line(_)) { STEEPEST } else { SLOPE_ROUNDING };
+        if hit.facing && (hit.feature == Feature::Face || line.is_closest_within(&hit.normal, slope)) {
             let fits = line.may_roll_onto(&hit.normal);
             self.push_if(fits, &line.at(s), line.radius, &hit, line_normal(line, &hit), line.feature(part), found);
         }
@@ -500,10 +506,15 @@ impl Line<'_> {
 
     /// Returns whether no direction from the edge into one of its faces leads closer.
     fn is_closest(&self, normal: &Vec3) -> bool {
+        self.is_closest_within(normal, SLOPE_ROUNDING)
+    }
+
+    /// Returns whether no direction from the edge into one of its faces leads closer at more than a slope.
+    fn is_closest_within(&self, normal: &Vec3, slope: f64) -> bool {
         let [n1, n2] = self.normals else { return true };
         let cos = n1.dot(n2);
         // into the first face is −(n₂ − n₁ cos)
-        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= SLOPE_ROUNDING)
+        [n2 - n1 * cos, n1 - n2 * cos].iter().all(|out| normal.dot(out) <= slope)
     }
 
     /// Returns whether a face with this normal is inclined so little to the faces of the edge that the body may roll

@@ -28,7 +28,8 @@
 //! | `V` | energy of the springs in the group, which are stiff for the step: what they released was `Σ λ·½(w₀ + w₁)` |
 //! | `v`, `|v|²` | velocity, twice its energy. In a group that nothing joins to the ground both are those relative to the rigid motion that has its momenta, which stay as they are |
 //!
-//! One factor for all velocities keeps joints closed in velocity. In a mechanism of one degree of freedom it is the only
+//! One factor for all velocities keeps joints closed in velocity, and so does one for those that the rows reach: the spin of a ball on
+//! a joint at its center is not among them. In a mechanism of one degree of freedom it is the only
 //! such change: its speed is exact wherever it is, and its time of higher order. In others the energy is exact, and the
 //! motion of second order.
 //!
@@ -50,6 +51,8 @@ use tumble_collide::{Mat3, Vec3};
 
 /// A joint with a larger velocity error at the start of a step closes in it, m/s or rad/s.
 const CLOSING: f64 = 1e-6;
+/// A row has no part in a coordinate of which its response is below this fraction of its largest.
+const UNREACHED: f64 = 1e-9;
 /// Largest share of the energy of motion that is returned at once: at the turn of a swing there is none.
 const MOST: f64 = 0.5;
 
@@ -223,7 +226,10 @@ pub(super) fn give_back(
         if !found.to_ground && !make_relative(objects(), end, &mut relative) {
             continue;
         }
-        let ranges = || objects().flat_map(|entry| entry.state_range.v.clone());
+        let reached = reached(work, &found.rows);
+        // without the ground, the rest of the group takes what a spin would leave of the momenta
+        let takes_part = |&i: &usize| !found.to_ground || reached[i];
+        let ranges = || objects().flat_map(|entry| entry.state_range.v.clone()).filter(takes_part);
         kinetic += ranges().map(|i| 0.5 * relative[i] * relative[i]).sum::<f64>();
         if done != 0.0 && done.abs() <= MOST * kinetic && !(found.takes_only && done < 0.0) {
             let factor = (1.0 - done / kinetic).sqrt() - 1.0;
@@ -233,6 +239,21 @@ pub(super) fn give_back(
     if du.iter().any(|du| *du != 0.0) {
         push(end.coordinates(core), &du, &mut Vec::new());
     }
+}
+
+/// Returns for every coordinate whether one of the rows reaches it: a joint at the center of a ball, or about the axis of a wheel,
+/// has no part in its spin.
+fn reached(work: &Workspace, rows: &[u32]) -> Vec<bool> {
+    let mut reached = vec![false; work.rows.dof];
+    for &i in rows {
+        let block = &work.rows.blocks[work.contact_constraints.len() + i as usize];
+        let sides = || block.sides().iter().map(|side| (side.u as usize, work.rows.response(side, 0)));
+        let largest = sides().flat_map(|(_, y)| y).fold(0.0, |a: f64, y| a.max(y.abs()));
+        for (start, y) in sides() {
+            y.iter().enumerate().for_each(|(k, y)| reached[start + k] |= y.abs() > UNREACHED * largest);
+        }
+    }
+    reached
 }
 
 /// Returns whether a row is a spring, a damper or a drive of finite gain.

@@ -79,16 +79,23 @@ pub(super) fn gap_rate(work: &Workspace, contact: usize, free: &FreeTerms, (row,
     (row - moved.time * rate - 0.5 * h * links, rate + links + driven)
 }
 
+/// The largest ratio of the velocities with which a contact that moves leaves and comes, without forces. Along the row of the
+/// middle of the step a contact that lasts comes as fast as it leaves, except for terms of higher order.
+const REFLECTED: f64 = 1.5;
+
 /// Adds to the right-hand side of a contact that touches what its rows still change until the end
 /// of the step. Rows of links are those of the middle of the step, velocities of driven parts those of
-/// its start.
-pub(super) fn add_motion(work: &mut Workspace, contact: usize, free: &FreeTerms, h: f64) {
+/// its start. `comes` is the velocity of the normal row before the contact acts, without forces, m/s: a contact that
+/// hardly comes does not last, whatever its motion, and an impulse `λ` that made it leave at `w₁` would do the work
+/// `λ·½(comes + w₁)`.
+pub(super) fn add_motion(work: &mut Workspace, contact: usize, free: &FreeTerms, (comes, h): (f64, f64)) {
     let (constraint, block) = (&work.contact_constraints[contact], &work.rows.blocks[contact]);
     let moved = &constraint.moved;
     let left = (h - moved.time) * moved.rate + 0.5 * h * moved.of_links + h * moved.of_driven;
     for (k, (row, axis)) in block.range().zip(&constraint.frame.axes).enumerate() {
         let (change, turning) = free.of_row(&work.rows, block, k);
-        work.c[row] += change + axis.dot(&left) - (h - moved.time) * turning;
+        let motion = change + axis.dot(&left) - (h - moved.time) * turning;
+        work.c[row] += if k == 0 { motion.max(REFLECTED * comes.min(0.0)) } else { motion };
     }
 }
 
