@@ -178,42 +178,44 @@ fn fast_cubes_do_not_go_through_a_thin_plate() {
     }
 }
 
-/// Two plates close on a body that lies between them, to less than its size. It cannot turn out of the way for ever, and no
-/// solution exists; it must not be shot away.
+/// Two plates close at 0.5 m/s each on a cone that has come to rest between them, to 5 cm. Where it can turn no further no solution
+/// exists; an unfinished one made it 5.9 km/s fast.
 #[test]
 fn a_vice_does_not_shoot_what_it_closes_on() {
-    let shapes = [
-        ("cone", Shape::cone(0.125, 0.25).unwrap()),
-        ("box", Shape::cuboid(Vec3::new(0.25, 0.2, 0.3)).unwrap()),
-        ("wedge", Shape::mesh(TriMesh::cuboid(Vec3::new(0.3, 0.2, 0.25)), &TreeSettings::octree()).unwrap()),
-        ("cylinder", Shape::cylinder(0.12, 0.25).unwrap()),
-    ];
-    for stepper in STEPPERS {
-        for (name, shape) in &shapes {
-            let mut fastest = 0.0f64;
-            for case in 0..4 {
-                let mut world = world(stepper, 1.0 / 60.0);
-                let material = Material { friction: 0.5, restitution: 0.0, ..Material::default() };
-                world
-                    .add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material))
-                    .unwrap();
-                for side in [-1.0, 1.0] {
-                    let plate = RigidBody::new(Shape::cuboid(Vec3::new(0.2, 2.0, 2.0)).unwrap())
-                        .with_pose(Pose::translation(0.5 * side, 0.0, 1.0))
-                        .with_velocity(Vec3::x() * (-0.5 * side));
-                    world.add_boxed(Box::new(plate.with_mass(1.0).with_material(material)), Mode::Kinematic).unwrap();
-                }
-                let turn = Vec3::new(0.3, 0.7, -0.2) * f64::from(case + 1);
-                let body = RigidBody::new(shape.clone()).with_density(1000.0).with_material(material);
-                let id = world.add(body.with_pose(Pose::new(Vec3::z() * 0.3, turn))).unwrap();
-                for _ in 0..45 {
-                    world.step().unwrap();
-                    fastest = fastest.max(world.part_state(id, 0).unwrap().velocity.norm());
-                }
+    for rate in [60.0, 240.0] {
+        let mut world = world("time_stepping", 1.0 / rate);
+        let material = Material { friction: 0.5, ..Material::default() };
+        world.add_static(RigidBody::fixed(Shape::half_space()).with_name("ground").with_material(material)).unwrap();
+        let plate = |side: f64| {
+            let shape = Shape::cuboid(Vec3::new(0.2, 2.0, 2.0)).unwrap();
+            RigidBody::new(shape).with_mass(1.0).with_material(material).with_pose(Pose::translation(side, 0.0, 1.0))
+        };
+        let plates = [-1.0, 1.0].map(|side| world.add_boxed(Box::new(plate(side)), Mode::Kinematic).unwrap());
+        let turn = Quat::from_quaternion(nalgebra::Quaternion::new(
+            -0.391_971_086_337_194_9,
+            0.201_403_595_095_671_4,
+            0.726_310_533_090_308_9,
+            0.527_511_392_180_538,
+        ));
+        let place = Vec3::new(-0.096_694_472_894_294_18, 0.125_308_095_680_108_98, 0.2);
+        let cone = RigidBody::new(Shape::cone(0.142_120_210_915_181_8, 0.192_446_678_440_967_58).unwrap())
+            .with_density(1000.0)
+            .with_material(material)
+            .with_pose(Pose::from_parts(place.into(), turn));
+        let cone = world.add(cone).unwrap();
+        (0..rate as usize).for_each(|_| {
+            world.step().unwrap();
+        });
+        let mut fastest = 0.0f64;
+        for _ in 0..(1.75 * rate) as usize {
+            for (plate, speed) in plates.into_iter().zip([0.5, -0.5]) {
+                world.set_velocity(plate, Vec3::x() * speed, Vec3::zeros()).unwrap();
             }
-            println!("{stepper} {name}: at most {fastest:.2} m/s");
-            assert!(fastest < 20.0, "{stepper} {name}: {fastest} m/s");
+            world.step().unwrap();
+            fastest = fastest.max(world.part_state(cone, 0).unwrap().velocity.norm());
         }
+        println!("{rate} Hz: at most {fastest:.2} m/s");
+        assert!(fastest < 20.0, "{rate} Hz: {fastest} m/s");
     }
 }
 
