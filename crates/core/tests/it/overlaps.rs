@@ -245,7 +245,7 @@ fn flat_bodies_come_to_rest_on_round_rods() {
                     let mut world = world("time_stepping", 1.0 / rate);
                     for i in -4..5 {
                         let place = Pose::new(Vec3::y() * (0.1 * f64::from(i)), turn);
-                        let fixed = RigidBody::fixed(rod.clone()).with_name(&format!("rod {i}")).with_pose(place);
+                        let fixed = RigidBody::fixed(rod.clone()).with_name(format!("rod {i}")).with_pose(place);
                         world.add_static(fixed).unwrap();
                     }
                     let spin = Vec3::new(-2.1, 4.7, 0.6) * (0.4 * f64::from(case));
