@@ -41,7 +41,7 @@ use super::pyramids;
 use super::reduced::Reduced;
 use super::relaxation::Relaxation;
 use super::{RIGID, RowSolver, SolveReport, SolverSettings, residual};
-use crate::constraint::rows::{Block, RowSet, Rows, dot};
+use crate::constraint::rows::{RowSet, Rows, dot};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
@@ -388,16 +388,14 @@ impl Solve<'_> {
         if outcome.converged {
             return;
         }
-        let rows = || self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]);
-        let speed = |du: &[f64]| {
-            let of_block = |block: &Block| {
-                let fastest = |(k, row): (usize, usize)| (self.c[row] + self.rows.row_velocity(block, k, du)).abs();
-                block.range().enumerate().map(fastest).fold(0.0, f64::max)
-            };
-            rows().map(of_block).fold(0.0, f64::max)
-        };
-        let free = vec![0.0; self.du.len()];
-        if speed(self.du) <= RUNAWAY * speed(&free) {
+        let (mut before, mut after) = (0.0, 0.0);
+        for block in self.blocks.iter().map(|&b| &self.rows.blocks[b as usize]) {
+            for (k, row) in block.range().enumerate() {
+                before = self.c[row].abs().max(before);
+                after = (self.c[row] + self.rows.row_velocity(block, k, self.du)).abs().max(after);
+            }
+        }
+        if after <= RUNAWAY * before {
             return;
         }
         self.lambda.copy_from_slice(swept);

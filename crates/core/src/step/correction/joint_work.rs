@@ -198,6 +198,7 @@ pub(super) fn give_back(
     let mut du = vec![0.0; core.dof];
     let energy_at_end = |&i: &u32| corrected.targets[i as usize].spring.as_ref().map_or(0.0, energy_of);
     let (mut whitened, mut relative) = (du.clone(), du.clone());
+    let mut reached = vec![false; core.dof]; // groups share no coordinate
     for found in workless {
         if !groups.iter().any(|group| group.rows == found.rows && group.closed()) {
             continue; // a limit takes part, or joints are open
@@ -226,7 +227,7 @@ pub(super) fn give_back(
         if !found.to_ground && !make_relative(objects(), end, &mut relative) {
             continue;
         }
-        let reached = reached(work, &found.rows);
+        mark_reached(work, &found.rows, &mut reached);
         // without the ground, the rest of the group takes what a spin would leave of the momenta
         let takes_part = |&i: &usize| !found.to_ground || reached[i];
         let ranges = || objects().flat_map(|entry| entry.state_range.v.clone()).filter(takes_part);
@@ -241,10 +242,9 @@ pub(super) fn give_back(
     }
 }
 
-/// Returns for every coordinate whether one of the rows reaches it: a joint at the center of a ball, or about the axis of a wheel,
-/// has no part in its spin.
-fn reached(work: &Workspace, rows: &[u32]) -> Vec<bool> {
-    let mut reached = vec![false; work.rows.dof];
+/// Marks the coordinates that one of the rows reaches: a joint at the center of a ball, or about the axis of a wheel, has no part in
+/// its spin.
+fn mark_reached(work: &Workspace, rows: &[u32], reached: &mut [bool]) {
     for &i in rows {
         let block = &work.rows.blocks[work.contact_constraints.len() + i as usize];
         let sides = || block.sides().iter().map(|side| (side.u as usize, work.rows.response(side, 0)));
@@ -253,7 +253,6 @@ fn reached(work: &Workspace, rows: &[u32]) -> Vec<bool> {
             y.iter().enumerate().for_each(|(k, y)| reached[start + k] |= y.abs() > UNREACHED * largest);
         }
     }
-    reached
 }
 
 /// Returns whether a row is a spring, a damper or a drive of finite gain.
